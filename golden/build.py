@@ -80,7 +80,7 @@ class Build:
     Raises
     ------
     ValueError
-        If a value is unknown or out of range. If two options exclude each other, it is a `BuildError`.
+        If a value is unknown or out of range. The error is a `BuildError` if two options exclude each other.
     """
 
     style: Style = "throughput"

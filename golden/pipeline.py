@@ -43,7 +43,7 @@ class ShadingPipeline:
     specular : HighlightOperand or None
         Specular unit; it takes the operand that the interpolator gives. ``None``: no specular light.
     lights : int
-        Number of lights, 0 to 16. With none there is ambient light alone, and no method.
+        Number of lights, 0 to 16. Without lights there is only ambient light, and no method.
     materials : int
         Number of materials, 1 to `frame_constants.MAX_MATERIALS`.
     gate : bool

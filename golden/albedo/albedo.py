@@ -65,7 +65,7 @@ class Albedo:
         parts : collection of str
             Words of `PARTS`. ``colors``: vertex colours. ``nearest`` or ``bilinear``: textures with this
             filter. ``outside``: texels in a memory outside of the design. ``tinted``: metals.
-            ``orthographic``: only for cameras without perspective, whose attributes are not over W.
+            ``orthographic``: only for cameras without perspective, whose attributes are not divided by W.
 
         Raises
         ------
@@ -86,7 +86,7 @@ class Albedo:
 
     @property
     def parts(self) -> tuple[str, ...]:
-        """The words that describe it, see `of_parts`."""
+        """The words that describe this albedo path, see `of_parts`."""
         texture = self.texture
         has = (
             self.colors,

@@ -1,4 +1,4 @@
-"""Spans of attributes: vertex colours and texture coordinates over W, and 1/W, of every pixel."""
+"""Spans of attributes: vertex colours and texture coordinates divided by W, and 1/W, of every pixel."""
 
 from dataclasses import dataclass
 from typing import Any, NamedTuple
@@ -19,7 +19,7 @@ LARGEST_RATIO = 2.0**15
 
 
 def whole_texels(left: np.ndarray, right: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """The whole texel from which the texture coordinates of a span count, and the range of the distance.
+    """The whole texel from which a span's texture coordinates are counted, and the range of their distance.
 
     Parameters
     ----------

@@ -113,7 +113,8 @@ class Attributes:
         """Entries ``base`` and ``slope`` of d, shape (512,) each, by the 9 bits behind the first bit of x.
 
         ``d = base - slope f`` with f from 0 to 1 in a step. A base is moved by half of the chord's error in
-        the middle. It contains half a step of d for its rounding, less the mean of the cut of the product.
+        the middle. The base contains half a step of d for the rounding of d, minus the mean error of the
+        product's cut.
         """
         step = 2.0**-self.TABLE_BITS
         x = 1 + np.arange(1 << self.TABLE_BITS) * step

@@ -17,7 +17,7 @@ LEVEL_BITS = 4
 """Bits of a level, and of the logarithm of a width or height."""
 
 _BASE_UNIT = 2
-"""Words of a bank from a base or index to the next."""
+"""Number of words of a bank from one base, or one index, to the next."""
 
 
 def levels_placed(width: int, height: int, levels: int) -> tuple[list[tuple[int, int]], int]:
@@ -207,8 +207,8 @@ class TexelMemory:
     def load(self, textures: Sequence[Texture]) -> LoadedTextures:
         """Contents with all levels of some textures. A texture that is given twice is stored once.
 
-        A base is a multiple of the power of two that holds the texture. So an address is a base and bits
-        beside it, with no sum.
+        A base is a multiple of the power of two that holds the texture. So an address is the bits of a base
+        and other bits below them, without an addition.
 
         Parameters
         ----------

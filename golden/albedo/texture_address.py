@@ -33,10 +33,10 @@ class TextureAddress:
     """From texture coordinates in texels of a level to an address in each bank, and two weights.
 
     ``first = floor(coordinate - 1/2)`` is the column (row) left of (over) the place. The fraction is the
-    share of the next column. Both are wrapped. One of them is even and the other odd, so each bank gets one
-    address. If both are the same texel (at a border, or of an image of one texel), the share counts as 0.
-    A sample of ``nearest`` has ``first = floor(coordinate)`` and the share 0. The weight of the odd column is
-    the share if ``first`` is even, else 1 less the share.
+    share of the next column. Both columns are wrapped. One column is even and the other odd, so each bank
+    gets one address. If both are the same texel (at a border, or of an image of one texel), the share counts
+    as 0. A sample of ``nearest`` has ``first = floor(coordinate)`` and the share 0. The weight of the odd
+    column is the share if ``first`` is even, else 1 less the share.
 
     An address is ``base + place of the level + (row/2) (width/2) + column/2``, all of them in different bits.
 

@@ -15,7 +15,7 @@ class TextureFilter:
     """Mean of four texels by two weights: first along a row, then from row to row.
 
     Three means ``a + w (b - a)`` a channel are three products. With equal texels, or a weight of 0 or 1, each
-    is exact. So a flat image gives its colour everywhere, and ``nearest`` needs no other path.
+    mean is exact. So a flat image gives its colour everywhere, and ``nearest`` needs no other path.
 
     ============ ========= ==================================================================
     word         format    why

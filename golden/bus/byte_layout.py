@@ -26,8 +26,8 @@ class Field:
     format : str
         Number format, for people.
     below : int, optional
-        Number of codes that are values, from 0 on, if not all codes are. Low bits past the last value are
-        read as the last value.
+        Codes of values are less than this number; by default every code is a value. Low bits past the last
+        value are read as the last value.
 
     Raises
     ------

@@ -66,7 +66,7 @@ class AngularSetup:
     psi          UQ(0, 36)    turns
     lambda       SQ(0, 40)    turns
     psi/(m-1)    UQ(0, 40)    turns; psi by its leading 17 bits times the reciprocal
-    cos beta     UQ(1, 25)    over 1 only where normals of unequal length are few steps apart
+    cos beta     UQ(1, 25)    over 1 only if normals differ in length and are few steps apart
     ============ ============ ====================================================================
 
     `error` bounds the error of cos gamma(t) at any pixel, against the formula above in exact arithmetic on

@@ -64,7 +64,7 @@ class Arccos:
 
     x near 1 is the usual case in a smooth mesh. There arccos behaves like a square root, and no polynomial in
     x fits it. Besides, the rounding of x to 16 bits alone is an error of 2.5 % for an angle of 1 degree.
-    `HalfChord`, which `AngularSetup` uses, avoids both.
+    `HalfChord`, which `AngularSetup` uses, has neither of these problems.
 
     Parameters
     ----------

@@ -268,7 +268,7 @@ class ChordSetup:
         shift : int64 array
         square : Fixed
         square_shift : int64 array
-            As by `step_words`, each of shape (spans, 1).
+            Results of `step_words`, each of shape (spans, 1).
         """
         reciprocal, shift, square, square_shift = step_words(length)
         return (

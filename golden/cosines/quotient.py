@@ -49,7 +49,7 @@ class Quotient:
     r^2          UQ(0, 17)   1/4 to 1; cut
     line         SQ(2, 16)   l 2^k, cut
     N·L          SQ(2, 18)   cut; the last bit is for the rounding in `Diffuse`
-    numerator    17 bits     14 to 17 of them count; cut
+    numerator    17 bits     14 to 17 of these bits are used; cut
     place        UQ(i, 12)   cut
     ============ =========== =====================================================================
 
@@ -99,7 +99,7 @@ class Quotient:
         """Entries ``base`` and ``slope`` of the reciprocal root, shape (512,) each, by q's upper 9 bits.
 
         ``r = base - slope f`` with f from 0 to 1 in a step. The first 128 entries are unused. A base is moved
-        by half of the chord's error in the middle, and contains the half step of r's rounding.
+        by half of the chord's error in the middle, and contains half a step for the rounding of r.
         """
         step = 2.0 ** -(self.TABLE_BITS - 2)
         q = np.maximum(np.arange(1 << self.TABLE_BITS) * step, 1.0)

@@ -113,9 +113,9 @@ class QuotientWords(NamedTuple):
     squares : tuple of three arrays, shape (spans, lights + 1)
         ``m`` of each light, and ``w`` last. Without highlights ``w`` alone.
     lines : tuple of two arrays, shape (spans, lights)
-        l of each light. It has no second difference.
+        l of each light. l has no second difference.
     heights : tuple of two arrays, shape (spans, lights)
-        z of each light; no second difference. Empty without ``QuotientSpans.takes_heights``.
+        z of each light. z has no second difference. Empty without ``QuotientSpans.takes_heights``.
     """
 
     squares: tuple[np.ndarray, np.ndarray, np.ndarray]
@@ -139,7 +139,7 @@ class QuotientSpans:
 
     A square has the start ``v·v``, the first difference ``2 v·d 2^-e + b`` and the second
     ``2 d·d 2^-2e``; b is half of the second difference, cut. Lines have the start ``v·L`` and the
-    difference ``d·L 2^-e``. d is the step, e its exponent; all products are of 18 bits. Pixel i has
+    difference ``d·L 2^-e``. d is the step and e its exponent; all products are of 18 bits. Pixel i has
     ``f + i D1 + i (i - 1)/2 D2``, exact in the words.
 
     ========= ============ =================================================================

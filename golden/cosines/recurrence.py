@@ -199,7 +199,7 @@ class Recurrence:
         step = np.asarray(angle, dtype=np.float64) / np.maximum(np.asarray(length) - 1, 1)
         cut = self.state_format.step
         error = (1.01 * np.square(step) + 2.0**-47) * 2.0**-self.fraction_bits + cut
-        # An error of the first value recurs up to 1/cos(2d) times as large, with d up to 11.25 degrees.
+        # An error of the first value comes back up to 1/cos(2d) times as large, with d up to 11.25 degrees.
         found: np.ndarray = 1.09 * (3 * error + 2 * cut) + steps * (18 * error + 2 * cut)
         return found
 

@@ -71,7 +71,7 @@ class Comparison:
     ----------
     golden : float64 array, shape (height, width, 3)
         The exact frame with the frame's model, in [0, 1], encoded by the transfer: per-pixel normals,
-        perspective-correct and normalised, of the triangles as rasterised.
+        perspective-correct and normalised, of the rasterised triangles.
     arithmetic_error : FrameErrors
         Against the same method and model in float64; NaN if the spans are unknown.
     method_error : FrameErrors

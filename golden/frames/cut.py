@@ -313,7 +313,7 @@ def cut_by_error(
 
     - its angle is over the method's `Interpolator.widest_span`;
     - ``chord-local`` would flag it: a word of `ChordSetup` would overflow;
-    - it has pixels between the places of the method's curve, and vectors turn farther than
+    - it has pixels between the places whose values the method's curve has, and vectors turn farther than
       `LocalChordInterpolator` allows;
     - it has pixels between these places, and the error of N·L or u is over its tolerance;
     - where its highlight shows, N·L of a light changes its sign or comes near 0, so N·L of a pixel might have

@@ -57,7 +57,7 @@ def error_bound(scene: Scene, design: ShadingPipeline, cut: Raster | None = None
 
         - another method than ``chord-local``, ``renormalise`` and ``quotient``;
         - vertex colours or textures, see `pixel_bound`;
-        - a pipeline for other materials than the scene's;
+        - a pipeline that was made for materials other than the scene's;
         - a measured curve;
         - a roughness under `LEAST_ROUGHNESS`;
         - ``renormalise`` with a lobe for which `Lobe.scale_of` gives a scale. Its words of 1 - N·H are too

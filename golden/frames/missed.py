@@ -81,9 +81,9 @@ def missed_pieces(scene: Scene, renderer: Renderer, sent: SceneTriangles) -> dic
     own line, at its quarters. `cut_by_error` does the same before it cuts. The quarters give the error in
     between up to a factor, which was found by search, see `LocalChordInterpolator`.
 
-    The words of N/W are off by up to `GradientSetup.error` of the longest normal of the triangle. This error
-    over m is the angle by which a normal of length m turns. If the angle alone is over a tolerance, the
-    normals are short.
+    The words of N/W are off by up to `GradientSetup.error` of the longest normal of the triangle. Divided by
+    m, this error is the angle by which a normal of length m turns. If the angle alone is over a tolerance,
+    the normals are short.
 
     Parameters
     ----------

@@ -86,7 +86,7 @@ class Pieces:
         """Result of `miss`; u of the places has the scale of the method's words."""
         pixels = (self.last - self.first + 1)[:, np.newaxis]
         setup = interpolator.value_setup
-        # Least number of pixels with which a span has pixels between the three (or two) values of its curve.
+        # Whether the span has pixels between the three (or two) places whose values its curve has.
         between = pixels > (3 if setup else 2)
         fading = np.array([light.fades for light in self.scene.lights], dtype=bool)
         names = ("diffuse", "highlight", "factor") if fading.any() else ("diffuse", "highlight")
@@ -108,7 +108,7 @@ class Pieces:
         least = np.maximum(highlight.least - margin / LocalChordInterpolator.MARGIN * misses["highlight"], 0)
         too_far = errors["diffuse"] > LocalChordInterpolator().diffuse_tolerance / limits.slope
         tolerance, lit = limits.tolerance(material, least), limits.is_lit(material, least)
-        # For a light that fades every pixel is checked, below.
+        # If a light fades, every pixel is checked below.
         too_far |= (errors["highlight"] > tolerance) & ~fading
         wrong |= (too_far & in_front & between).any(axis=1)
         if fading.any():
@@ -328,7 +328,8 @@ def _mistakes_sign(
         t = t[:, np.newaxis]
         fit = left[of_pixel] + t * (slope[of_pixel] + t * curvature[of_pixel])
         wrong = np.where(exact.diffuse > 0, fit <= bound[of_pixel], fit > -bound[of_pixel])
-        # Nearer to 0 no word tells the sign. The little light of a light that fades may be shown or not.
+        # Nearer to 0, words do not tell the sign. A pixel that a fading light hardly reaches may be lit or
+        # not.
         wrong &= np.abs(exact.diffuse) > ChordSetup.DIFFUSE_FORMAT.step
         least = LocalChordInterpolator.FACTOR_BUDGET / (255 * transfer_slope)
         wrong &= (exact.factor > least) & lights[of_pixel]

@@ -134,7 +134,7 @@ class _Filler:
 
 
 def _true_ends(scene: Scene, cut: Raster) -> tuple[np.ndarray, np.ndarray]:
-    """Ends of the true line. If both are 0, the face's normal takes their place, as in `fragment_normals`."""
+    """Ends of the true line. If both are 0, they become the face's normal, see `fragment_normals`."""
     left, right = line_ends(cut)
     lost = np.ones(len(left), dtype=bool)
     for end, weights in ((left, cut.weights_left), (right, cut.weights_right)):

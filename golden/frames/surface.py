@@ -27,7 +27,7 @@ __all__ = [
 ]
 
 MOST_TEXELS = 62
-"""Texels that a span of several pixels crosses at most, along u and along v. Its range is then at most 5."""
+"""Texels that a span of several pixels crosses at most, along u and along v. Their ``range`` is 5 or less."""
 
 _WHITE = Texture(np.ones((1, 1, 3)), filter="nearest")
 """Texture of materials without a texture."""
@@ -168,7 +168,7 @@ def span_attributes(scene: Scene, cut: Raster, albedo: Albedo) -> SpanAttributes
 
     Notes
     -----
-    Far outside an image that is clamped every place has the texel of the border. There a place may move.
+    Far outside a clamped image every place has the texel of the border, so a place there may be moved.
     """
     mesh = scene.mesh
     corners = mesh.faces[cut.triangle]

@@ -156,7 +156,7 @@ class CoarseDepth:
         full = (1 << self.block) - 1
         behind = np.zeros(len(order), dtype=bool)
         by_rank = np.argsort(rank, kind="stable")
-        # Turn r takes part number r of every block, so that the blocks within a turn differ.
+        # Turn r takes part number r of every block, so no block occurs twice in a turn.
         for part in np.split(by_rank, np.cumsum(np.bincount(rank))[:-1] if len(rank) else []):
             at, what = block[part], order[part]
             behind[what] = lo[what] > bound[at]

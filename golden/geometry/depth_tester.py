@@ -18,8 +18,8 @@ class DepthTester:
     The sum is exact. It saturates to 0 and to `FARTHEST`. A picture is cleared to the depth `CLEARED`,
     `FARTHEST` + 1. So the first pixel at a place is always drawn. If depths are equal, the first pixel stays.
 
-    The step is rounded to nine fraction bits; this error, at most 2^-10, adds up along a span. Together with
-    it the depth of a pixel is off by at most ``2^23`` times `GradientSetup.error`, and 1 for the cut.
+    The step is rounded to nine fraction bits; this error, at most 2^-10, adds up along a span. With this
+    error the depth of a pixel is off by at most ``2^23`` times `GradientSetup.error`, plus 1 for the cut.
 
     Source: docs/theory/geometry.md#depth; not in the documents.
     """

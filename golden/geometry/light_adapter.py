@@ -24,7 +24,7 @@ class LightAdapter:
     ========== ============ =====================================================================
     x, y, z    SQ(1, 17)    of `VectorAdapter` with ``rotates``: the vector and its step are shorter than 1
     axis       SQ(1, 17)    rounded to the nearest code, 1 to ``1 - 2^-17``
-    component  SQ(1, 17)    modulo 2; no axis makes it longer than the vector, so that none wraps
+    component  SQ(1, 17)    modulo 2; no axis makes it longer than the vector, so it does not wrap
     ========== ============ =====================================================================
 
     A code of an axis is off by 2^-18. The codes of 1 and -1 are off by 2^-17; then the axis's other codes are
@@ -36,7 +36,7 @@ class LightAdapter:
 
     FORMAT = QuotientSpans.COMPONENT_FORMAT
     AXIS_ERROR = 3 * 2.0**-18
-    """Largest change of a vector, over its length, by the codes of a frame's axes."""
+    """Largest change of a vector by the codes of a frame's axes, divided by the vector's length."""
 
     @classmethod
     def codes_of(cls, axes: np.ndarray) -> np.ndarray:

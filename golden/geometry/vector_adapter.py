@@ -61,7 +61,7 @@ class VectorAdapter:
     `SpanHalver` cuts spans. A step of a piece of three pixels or more is at most half of the difference of
     its ends, and fits. In a piece of two pixels no component of 1/2 or more changes its sign, so its step
     fits, too. Along a piece ``|N/W|`` is at least 5/16 in the scale of the words, if an end reaches
-    `SHORTEST`. The method asks for 0.2236. So it needs no other cuts.
+    `SHORTEST`. The method needs at least 0.2236, so no other cuts are needed.
 
     Rounding moves a component of the start by half a step of its word. If the longer end is at least
     `SHORTEST`, this is at most `ERROR` times its length. At the right end rounding of the step adds `ERROR`

@@ -71,7 +71,7 @@ class HighlightGate(Gate):
     docs/theory/bounds.md#gate-of-unit-normals proves it, with `GateLimits.excess` rounded up to whole steps
     (`margin`).
 
-    The margins cost little: for quadratic normals a span is let through only if
+    The margins cost little: with quadratic normals a span is lit only if
     ``M^2 >= tau^2 - 10 * 2^-17``. Ends must be unit vectors from `quantise`;
     docs/theory/bounds.md#gate-of-unit-normals describes other vectors.
 

@@ -70,7 +70,7 @@ class HighlightOperand:
 
     @property
     def parts(self) -> int:
-        """Number of parts of a table, each with another argument, for a unit with tables."""
+        """Number of parts of a table, each with its own argument, for a unit with tables."""
         return 1
 
     @property

@@ -41,8 +41,8 @@ class Lobe(HighlightOperand):
     result        UQ(0, 17)   v + D f is between v and the next entry: it cannot wrap
     ============= =========== =====================================================================
 
-    *Range.* The term is 0 where N·H is not positive, ``u >= 1``, and for a dark beat. A negative u, which
-    vectors longer than 1 give, counts as 0.
+    *Range.* The term is 0 where N·H is not positive, ``u >= 1``, and for a dark beat. Vectors longer than 1
+    may give a negative u, which counts as 0.
 
     *Monotone.* Over the whole range the term falls where the entries fall. `table` makes falling entries from
     every falling curve.
@@ -74,10 +74,10 @@ class Lobe(HighlightOperand):
     without a gate. The largest argument with a term over 0 follows from the table
     (`LobeTable.last_lit_argument`). A lobe with a long tail may have terms over 0 up to u = 1: ``ggx`` from
     alpha = 0.044 on. Its gate leaves out only spans that face away from H. With a ``cutoff`` a gate leaves
-    out more: `table` sets entries under the cutoff to 0. The picture then differs from the model's, with and
-    without a gate alike. The difference is at most the cutoff times the intensity I, with
-    ``cutoff = 1/(510 I)`` half an LSB. A gate must keep terms over 0, even under half an LSB, because they
-    may change the rounding of a sum.
+    out more: `table` sets entries under the cutoff to 0. The picture then differs from the picture of the
+    model, in the same way with and without a gate. The difference is at most the cutoff times the intensity
+    I, with ``cutoff = 1/(510 I)`` half an LSB. A gate must keep terms over 0, even under half an LSB, because
+    they may change the rounding of a sum.
 
     *Loading.* A write of 18 bits loads an entry. Entries come in order, and the unit computes the differences
     (`LobeTable.writes`). A table takes (E + 1) M + 2 writes, 338 by default. Words of 35 bits would take
@@ -241,7 +241,7 @@ class Lobe(HighlightOperand):
     def table(self, parameter: float | None = None) -> "LobeTable":
         """Table of the model for one parameter.
 
-        Two lines meet at an entry. An entry is the value of the curve, moved against the error of these
+        Two lines meet at an entry. An entry is the value of the curve, moved to lessen the error of these
         lines. This error is measured in the middle of each line. The entry is moved by half of the larger
         error, but by at most twice the smaller error. If one line is too high and the other too low, the
         entry stays.

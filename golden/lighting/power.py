@@ -32,7 +32,7 @@ class Power(HighlightOperand):
     The arithmetic error of the result for an exact argument is at most `ERROR`, and only makes the result
     smaller (docs/theory/bounds.md#power). Where the cosine falls, the term may rise, but by at most 5 steps
     of 2^-17, 0.01 LSB at intensity 1. With the operand ``cosine``, 1 is 2^-16 more than the square of a
-    code's length. So with n = 1 the term is one step in place of 0, up to 2^-17 past the right angle.
+    code's length. So with n = 1 the term is one step instead of 0, from the right angle to 2^-17 past it.
 
     Parameters
     ----------

@@ -305,8 +305,8 @@ class Specular(HighlightOperand):
             largest = self.BASE_FORMAT.max_code - self.cutoff.codes
             codes = (((largest + 1) << 16) - 1) // np.maximum(scale.codes, 1)
             return Fixed(format, np.minimum(codes, format.max_code))
-        # By bisection, because the base falls with the argument. For each shifted argument the last argument
-        # counts.
+        # By bisection, because the base falls with the argument. If several arguments have the same shifted
+        # argument, the last of them counts.
         boundary = np.zeros_like(exponent)
         for bit in reversed(range(format.width)):
             shifted = boundary | 1 << bit

@@ -15,7 +15,7 @@ __all__ = ["Transfer"]
 class Transfer:
     """The curve of sRGB, correctly rounded: ``floor(255 encode(x/255) + 1/2)`` for every input x.
 
-    The inputs are cut into parts that are so short that the code rises at most once in each. A word of a
+    The inputs are divided into parts so short that the code rises at most once in each part. A word of a
     table tells the code at the start of a part, and the place of the rise. No product is needed.
 
     Inputs up to 255/64 are parts of their own. Above, each octave has 128 parts. In an octave from
@@ -52,7 +52,7 @@ class Transfer:
 
     @classmethod
     def shift(cls, codes: np.ndarray) -> np.ndarray:
-        """Bits k of the place in its part of each input code."""
+        """For each input code, the number k of bits that hold its place within its part."""
         length = np.frexp(codes)[1].astype(np.int64)
         found: np.ndarray = np.maximum(length - 1 - cls.PART_BITS, 0)
         return found

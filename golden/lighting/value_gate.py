@@ -109,8 +109,8 @@ class ValueGate(Gate):
     def lit(self, spans: Spans, halfway: np.ndarray, threshold: Fixed) -> np.ndarray:
         """Bit-accurate decisions from the values of spans, see `Gate.lit`; H has no effect.
 
-        Values without a pixel are replaced. These are the middle value of a span of two pixels, and the
-        second and third value of a span of one pixel.
+        Values that belong to no pixel are replaced. These are the middle value of a span of two pixels, and
+        the second and third value of a span of one pixel.
         """
         if spans.values is None:
             raise ValueError("a value gate takes spans with values")

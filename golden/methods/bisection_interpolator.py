@@ -46,7 +46,7 @@ class BisectionInterpolator(NormalInterpolator):
 
     ORIGIN = "documents"
     MAX_ANGLE = 90.0
-    # The ends of the straight lines lie at multiples of 1/2^k. None of these places is an end.
+    # The ends of the straight lines lie at multiples of 1/2^k. None of the places here is an end.
     CHECKED_AT = (0.09, 0.31, 0.45, 0.64, 0.82)
 
     def __post_init__(self) -> None:

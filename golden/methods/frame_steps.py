@@ -16,7 +16,7 @@ __all__ = ["Bound", "ErrorBounds", "ExactShading", "SpanCutter", "SpanFiller"]
 
 
 class SpanCutter(Protocol):
-    """Ways to cut the spans of a frame. Each gives the spans, and the number of given spans that were cut."""
+    """Ways to cut the spans of a frame. Each gives the new spans, and how many given spans were cut."""
 
     def by_error(self) -> tuple[Raster, int]:
         """Cut until the method's curve keeps its tolerance, see `cut_by_error`."""

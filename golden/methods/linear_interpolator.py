@@ -22,7 +22,7 @@ class LinearInterpolator(NormalInterpolator):
     """``(1-t) N_l + t N_r`` by a first difference.
 
     A normal is too short, by ``1 - cos(psi/2)`` in the middle of the span. Components of ``N_r - N_l``
-    saturate at 1. This can happen over 60 degrees, and the span is then flagged.
+    saturate at 1. This can happen only in spans over 60 degrees; the span is then flagged.
 
     Parameters
     ----------

@@ -33,8 +33,8 @@ class LocalChordInterpolator(Interpolator):
     """``N . L`` and ``u = |N - H|^2 / 2`` of each pixel by two additions each, with L and H of the pixel.
 
     A span brings three values of N·L and three of u: at the first pixel centre, in the middle and at the last
-    pixel centre. The source of spans computes them, where positions are known. `ChordSetup` computes the
-    quadratics through them, with a bound of the drift. Accumulators of 49 bits compute the pixels. The
+    pixel centre. The source of the spans, which knows positions, computes these values. `ChordSetup` computes
+    the quadratics through them, with a bound of the drift. Accumulators of 49 bits compute the pixels. The
     specular unit takes u as its ``1 - cos gamma``. In a span of one or two pixels each pixel has its own
     values, and needs no setup.
 
@@ -309,7 +309,7 @@ class LocalChordInterpolator(Interpolator):
     def exact_operands(
         self, values: SpanValues, length: np.ndarray, factors: np.ndarray | None = None
     ) -> tuple[np.ndarray, ...]:
-        """Values at every pixel of the quadratics through the values of spans, in float64, in units of 1.
+        """The quadratics through the values of spans, at every pixel; float64 in units of 1.
 
         Parameters
         ----------

@@ -77,7 +77,7 @@ class QuadraticInterpolator(NormalInterpolator):
 
     @property
     def degrees(self) -> Sequence[int]:
-        """Degrees of the middle normal's polynomial: 2, a plain minimax fit, or 3; none as published."""
+        """Degrees of the middle normal: 2, a plain minimax fit, or 3, the default. Published: no choice."""
         return () if self.middle_normal == MiddleNormal("as_published") else (2, 3)
 
     def with_degree(self, degree: int) -> Interpolator:

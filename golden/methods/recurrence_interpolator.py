@@ -93,7 +93,7 @@ class RecurrenceInterpolator(EndNormalInterpolator):
         shape = (len(span), len(direction.codes))
         results = np.zeros((2, *shape), dtype=np.int64)
         out_of_range = np.zeros(len(length), dtype=bool)
-        # A call takes as many steps as its longest span has pixels. So spans of similar length share a call.
+        # A call takes as many steps as its longest span has pixels, so a call gets spans of similar length.
         size = np.frexp(length)[1]
         for group in np.unique(size):
             inside = size == group

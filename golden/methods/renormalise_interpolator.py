@@ -31,10 +31,10 @@ class RenormaliseInterpolator(NormalInterpolator):
     of the normal's length counts there only at second order.
 
     The longer end has length 1. Rounding to words turns a vector of length m by up to
-    ``(LineSetup.ERROR + sqrt(3) 2^-23)/m``. At `LARGEST_RATIO`, m = 1/64, this is 2.7e-5 radians, 0.17 LSB on
-    the steepest flank of n = 1000. Spans with shorter vectors must be cut. Such vectors occur if W differs
-    much between the ends, or if the ends are nearly opposite. If every component of a pixel's vector is under
-    1/256, the span is flagged, and the pixel is wrong.
+    ``(LineSetup.ERROR + sqrt(3) 2^-23)/m``. At `LARGEST_RATIO`, where m = 1/64, this is 2.7e-5 radians, 0.17
+    LSB on the steepest flank of n = 1000. Spans with shorter vectors must be cut. Such vectors occur if W
+    differs much between the ends, or if the ends are nearly opposite. If every component of a pixel's vector
+    is under 1/256, the span is flagged, and the pixel is wrong.
 
     Parameters
     ----------

@@ -30,8 +30,8 @@ class AdaptiveNormaliser:
     ``E_j + phi (E_(j+1) - E_j)``, where phi is the fractional part, and every further pixel adds
     ``(E_(j+1) - E_j) 2^k/(m - 1)``. The last pixel is a segment of its own, so that both ends are exact.
 
-    The published design extrapolates the end of the span instead. It is no variant here:
-    docs/theory/bounds.md#adaptive-normaliser has three reasons.
+    The published design extrapolates the end of the span instead. That design is not offered here;
+    docs/theory/bounds.md#adaptive-normaliser gives three reasons.
 
     A span wider than the bisection's `max_angle` is flagged and stays undivided. Its normals lie on the
     straight line between its ends. (If the ends differ by more than 1 in a component, they lie near the left

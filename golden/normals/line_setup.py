@@ -29,8 +29,8 @@ def quantise_line(left: np.ndarray, right: np.ndarray) -> tuple[np.ndarray, np.n
 class LineSetup:
     """First difference ``W = P dt``, ``P = N_r - N_l``, of vectors in ``SQ(1, 22)``; ``dt = 1/(m - 1)``.
 
-    The vector may be short at one end of the line. A renormaliser magnifies every error there. So P and dt
-    have more bits than a multiplier's operand. This takes three products a component, nine a span.
+    The vector may be short at one end of the line. A renormaliser magnifies every error at that end. So P and
+    dt have more bits than a multiplier's operand. This takes three products a component, nine a span.
 
     ========== ============ ============================================================
     word       format       why

@@ -39,7 +39,7 @@ class Format:
     Raises
     ------
     TypeError
-        If a bit count is no integer.
+        If a bit count is not an integer.
     ValueError
         If the width is not 1 to 63 bits, the range in which codes fit an int64.
     """
@@ -176,7 +176,7 @@ class Fixed:
     Raises
     ------
     TypeError
-        If the codes are no integers.
+        If the codes are not integers.
     ValueError
         If a code is outside the format's range.
     """

@@ -2,8 +2,9 @@
 
 A component is ``SQ(1, 17)``, 18 bits, the signed operand of an 18 x 18 multiplier. The code of length 1 is
 ``ONE = 2**17 - 1``, as in a signed-normalised texture format. So 1 and -1 are both exact, and a vector along
-an axis is exactly a unit vector. Read as fixed-point numbers all lengths are ``ONE / 2**17``. So a dot
-product of two unit vectors of angle a is ``(ONE / 2**17)**2 * cos(a)``, and `ONE_SQUARED` stands for 1.
+an axis is exactly a unit vector. As a fixed-point number, the length of every unit vector is ``ONE / 2**17``.
+So a dot product of two unit vectors of angle a is ``(ONE / 2**17)**2 * cos(a)``, and `ONE_SQUARED` stands for
+1.
 
 Source: docs/theory/interpolation.md#spans.
 """
@@ -37,9 +38,9 @@ CODE_LENGTH_ERROR = 3**0.5 * COMPONENT.step / 2 * (1 + 2.0**-10)
 def quantise(vectors: np.ndarray) -> np.ndarray:
     """Codes of unit vectors. Their length is nearer to 1 than the length of rounded components.
 
-    A vector has eight neighbours on the grid of codes. The neighbour with the length nearest to 1 is taken.
-    Near the peak of a highlight an error of the normal's length changes the specular term at first order. An
-    error of its direction changes it only at second order. The error of a component is under one step,
+    A vector has eight neighbours on the grid of codes. The result is the neighbour whose length is nearest to
+    1. Near the peak of a highlight an error of the normal's length changes the specular term at first order.
+    An error of its direction changes it only at second order. The error of a component is under one step,
     ``2**-17``.
 
     Parameters

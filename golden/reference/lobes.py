@@ -51,8 +51,8 @@ class CoplanarPhong(ReflectionModel):
     ``R·V = 2 c^2 - 1``, and this is Phong's model. Near its peak this is Blinn's model with an exponent of 4
     p (`exponent_ratio`).
 
-    Elsewhere R·V is no function of N·H, and this model differs from Phong's. At grazing light the highlight
-    of this model, like Blinn's, is drawn out. Phong's highlight stays round.
+    Elsewhere R·V is no function of N·H, and this model differs from Phong's. In grazing light the highlight
+    of this model is drawn out, like Blinn's, whereas Phong's stays round.
 
     Source: docs/theory/models.md#reflection-models; [P].
     """

@@ -178,7 +178,8 @@ def _assemble(
     """Clip, divide and round triangles. Drop triangles without area, and back faces if the scene culls.
 
     Also returns the mesh triangles with a part left after clipping, and with an area left after rounding.
-    The rounded corners tell a back face: then a closed surface has a front wherever it has a back.
+    The rounded corners decide whether a face is a back face. So a closed surface has a front wherever it has
+    a back.
     """
     near = scene.camera.near
     x, y, w, depth = np.moveaxis(corners, -1, 0)
@@ -378,7 +379,8 @@ def _drawn(pieces: _Pieces, width: int, height: int) -> tuple[np.ndarray, np.nda
             # A pixel must be nearer than the stored depth. At equal depth the lower triangle, drawn before,
             # stays.
             winner = np.flatnonzero((value > before) & (value == buffer[pixel]))[::-1]
-            # The last of several assignments counts. In reversed order this is the first span of the chunk.
+            # If a pixel is assigned several times, the last assignment counts. In reversed order it comes
+            # from the first span of the chunk.
             index = np.repeat(np.arange(count + run.start, count + run.stop, dtype=np.int32), lengths)
             owner[pixel[winner]] = index[winner]
         count += len(piece)

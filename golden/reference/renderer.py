@@ -295,8 +295,8 @@ def shade_spans(
     """Picture from spans alone, as in hardware.
 
     The normal of a fragment is the curve between its span's ends at ``t = offset / (length - 1)``. In a span
-    of one pixel t is 0. The normal keeps the length that the curve gives. The line of the exact frame has
-    ends with lengths. So ``normalised`` with unit ends differs from it
+    of one pixel t is 0. The normal keeps the length that the curve gives. In an exact frame the ends of the
+    line have lengths, so ``normalised`` between unit ends differs from that line
     (docs/theory/interpolation.md#true-spans).
 
     Parameters
@@ -422,7 +422,7 @@ def _points(scene: Scene, raster: Raster, which: np.ndarray) -> np.ndarray | Non
 
 def _background(scene: Scene) -> np.ndarray:
     image = np.empty((scene.height, scene.width, 3))
-    # A row at a time: three values at a time take four times as long.
+    # One row at a time: with three values at a time the loop takes four times as long.
     image[0] = scene.background
     image[1:] = image[0]
     return image

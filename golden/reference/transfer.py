@@ -61,7 +61,7 @@ def encode(light: npt.ArrayLike, transfer: str = "srgb") -> np.ndarray:
     if _is_linear(transfer):
         return light
     power = light ** (1 / _EXPONENT)
-    # Exactly 1 at 1, as the offset is the scale less 1.
+    # The result at 1 is exactly 1, because the offset is the scale minus 1.
     curve = power + _OFFSET * (power - 1)
     found: np.ndarray = np.where(light <= _LAST_LINEAR, LARGEST_SLOPE * light, curve)
     return found

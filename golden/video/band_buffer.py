@@ -75,7 +75,7 @@ class BandBuffer:
 
     @property
     def error(self) -> int:
-        """Largest difference of a channel between a colour drawn and shown."""
+        """Largest difference between a channel as drawn and the same channel as shown."""
         return (1 << 8 - min(self.colour_bits)) - 1
 
     def kept(self, colour: npt.ArrayLike) -> np.ndarray:

@@ -16,9 +16,9 @@ class BandDepth:
     A word holds a depth and a tag of ``tag_bits`` bits: the number of the band in which it was written,
     modulo ``2^tag_bits``. A word with another tag than the present tag reads as `DepthTester.CLEARED`. An old
     tag must not become the present tag again. So when a band begins, ``swept`` words are written with the tag
-    before the present tag, beginning with the words that were swept longest ago. Let t be ``tag_bits``. A
-    word's next sweep comes at most ``2^t - 2`` bands after its last sweep. One band later the word's tag
-    would be the present tag.
+    before the present tag, beginning with the words that were swept longest ago. Let t be ``tag_bits``. Two
+    sweeps of a word are at most ``2^t - 2`` bands apart. One band later the word's old tag would be the
+    present tag.
 
     Parameters
     ----------

@@ -19,7 +19,7 @@ class ControlState:
     angle : int
         Code of the frame's angle.
     running, backwards : bool
-        Whether the angle changes from frame to frame, and whether it decreases.
+        Whether the angle changes from frame to frame, and whether the angle decreases.
     material, light : int
         Indices of the chosen preset.
     """
@@ -44,7 +44,7 @@ class Controls:
     materials, lights : int
         Numbers of materials and of lights among the presets, 1 to 64.
     step : int
-        Codes of an angle from a frame to the next, 1 to 4095.
+        Change of the angle's code from one frame to the next, 1 to 4095.
     first : int
         Code of the angle before the first frame, 0 to 4095.
     debounce_bits : int

@@ -97,7 +97,7 @@ class Display:
         expected = DisplayTiming(self.mode).compute(visible, first * line.total)
         frames = np.empty((len(tops), *self.mode.size[::-1], 3), dtype=np.uint8)
         for k, top in enumerate(tops.tolist()):
-            # The porches of the last line may not have been sent yet.
+            # The porches of the last line may still be missing.
             sent = min(visible, len(words) - top)
             part = slice(top, top + sent)
             wrong = active[part] != expected["active"][:sent]

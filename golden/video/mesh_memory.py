@@ -20,8 +20,8 @@ _BLOCK_WORDS = 512
 def block_rams(words: int, width: int) -> int:
     """Least number of block RAMs of an ECP5 (18 kbit, at most 36 bits wide) for a memory.
 
-    Blocks have 512 words of 36 bits, 1024 of 18, 2048 of 9, 4096 of 4, 8192 of 2 or 16384 of 1. The best
-    shape is taken.
+    Blocks have 512 words of 36 bits, 1024 of 18, 2048 of 9, 4096 of 4, 8192 of 2 or 16384 of 1. The shape
+    that needs the fewest blocks is taken.
     """
     shapes = ((512, 36), (1024, 18), (2048, 9), (4096, 4), (8192, 2), (16384, 1))
     return min(-(-words // depth) * -(-width // bits) for depth, bits in shapes)

@@ -41,10 +41,11 @@ def _turns(axis: Sequence[float]) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
 class Motion:
     """Entries ``c0 + c1 cos a + c2 sin a`` of the matrices of turning meshes.
 
-    With any axis and camera, every entry of camera times rotation has this form. So has every entry of axes
-    for normals times rotation. A table of a quarter turn, 1024 words in ``SQ(2, 16)``, has the sines of
-    ``(k + 1/2) 2 pi / 2^12``. Due to the half step the other quarters are its mirror images. An entry takes
-    two products. Their sum with c0 is rounded to 20 fraction bits for offsets, to 16 for the other entries.
+    With any axis and camera, every entry of the product of camera and rotation has this form. So has every
+    entry of the product of the normals' axes and the rotation. A table of a quarter turn, 1024 words in
+    ``SQ(2, 16)``, has the sines of ``(k + 1/2) 2 pi / 2^12``. Due to the half step the other quarters are its
+    mirror images. An entry takes two products. Their sum with c0 is rounded to 20 fraction bits for offsets,
+    to 16 for the other entries.
 
     The error of an entry is at most `ENTRY_ERROR`. It is the sum of 2^-17 each for sine and cosine, times
     coefficients below 2; 2^-17 each for c1 and c2; 2^-21 for c0; and half a step for the rounding.
