@@ -1,4 +1,4 @@
-"""The report's section on switching: toggled register bits a pixel of a frame, also with a highlight gate.
+"""The report's section on switching: register bits that toggle for a pixel, without and with a gate.
 
 Toggled bits stand for energy, because CMOS takes most energy when bits change. `toggles` says which bits are
 counted.
@@ -39,8 +39,10 @@ BLOCKS: dict[str, tuple[str, ...]] = {
     "intensity": ("intensity",),
     "assembler": ("shaded", "pixel_assembler"),
 }
-"""Submodules of the pipeline by block, in the stream's order. An inner submodule counts for its own block.
-The sums of ``quotient`` and the normals of ``bisection`` are in the setup of spans.
+"""Submodules of the pipeline by block, in the order of the stream.
+
+A submodule inside another submodule counts for its own block. The sums of ``quotient`` and the normals of
+``bisection`` are in the setup of spans.
 """
 
 DESIGN = ("quotient", "blinn")
@@ -80,7 +82,7 @@ def measure(
     method, model : str
         Method and reflection model.
     gate : bool
-        Whether it has a highlight gate.
+        Whether the pipeline has a highlight gate.
     exponents : sequence of int
         Exponents, with a frame for each.
     size : sequence of int
@@ -161,7 +163,7 @@ def section(tasks: Sequence[Task], results: Sequence[Any]) -> Section:
         "whole pipeline changes by "
         f"{' to '.join(dict.fromkeys(_change(key, saved) for key in (best, worst)))}.",
         "**Not counted**: bits inside multipliers and other logic between two registers, glitches, wires, "
-        "the clock tree, and bits inside memories. The count compares designs. It is not an energy in "
+        "the clock tree, and bits inside memories. The count compares designs. The count is not an energy in "
         "joules.",
     ]
     if not all(frame["same"] for frame in all_frames):

@@ -6,8 +6,9 @@ coscos4 and blinn_product, the exponents 2, 10, 50, 200 and 1000. There are fram
 throughput style, without and with the gate. The command prints two tables in Markdown: gated spans and
 pixels, and cycles.
 
-The exit status is 1 if a frame is not equal, to the bit, in all four simulations and by the bit-accurate
-model. It is 2 for bad input. The report's section `energy` has the gate's savings of toggled register bits.
+The exit status is 1 if a frame of one of the four simulations differs by a bit from the frame of the
+bit-accurate model. The exit status is 2 for bad input. The report's section `energy` has the gate's savings
+of toggled register bits.
 
 The methods quotient and renormalise have no gate, because their spans bring no unit normals.
 """
@@ -53,7 +54,7 @@ __all__ = [
 ]
 
 METHODS = tuple(name for name, of in ALL_METHODS.items() if of.serves_gate and of.ORIGIN != "own")
-"""Methods of unit normals, which serve the gate: linear, and the methods of the documents."""
+"""Methods that serve the gate, because they have unit normals: linear, and the methods of the documents."""
 
 METHOD = "quadratic"
 """Default method of `METHODS`."""
@@ -64,7 +65,7 @@ EXPONENTS = (2, 10, 50, 200, 1000)
 
 @dataclass(frozen=True)
 class Shares:
-    """Spans and pixels of a frame that the gate keeps away from the specular unit, and their upper limits.
+    """Spans and pixels of a frame that the gate keeps away from the specular unit, and upper limits of both.
 
     Parameters
     ----------
@@ -92,7 +93,7 @@ class Shares:
 
 @dataclass(frozen=True)
 class GateRow:
-    """A frame without and with the gate. Pairs are in this order.
+    """A frame without and with the gate. The first number of a pair is without the gate.
 
     Parameters
     ----------
@@ -106,7 +107,7 @@ class GateRow:
         Cycles of the throughput and of the compact style, from the first write of a constant to the last
         pixel.
     identical : bool
-        Whether the pixels of all four simulations equal the bit-accurate model, also hidden pixels.
+        Whether the pixels of all four simulations equal the bit-accurate model, hidden pixels among them.
     """
 
     mesh: str
@@ -119,7 +120,10 @@ class GateRow:
 
 
 def shares_of(design: ShadingPipeline, spans: Spans, constants: FrameConstants) -> Shares:
-    """Shares of a frame by the bit-accurate gate, for one light and material. The design may have no gate."""
+    """Shares of a frame by the bit-accurate gate, for one light and material.
+
+    The design itself may have no gate.
+    """
     spans = spans[np.flatnonzero(spans.length)]
     length = np.asarray(spans.length, dtype=np.int64)
     operands = design.operands(spans, constants)
@@ -150,9 +154,9 @@ def frames(
     units : sequence of Component
         Pipelines.
     spans : Spans
-        Input of each.
+        Input of each pipeline.
     constants : FrameConstants
-        Constants to write first.
+        Constants that are written first.
     engine : str
         As `simulate` takes it.
     """
@@ -221,7 +225,7 @@ def measure(
     meshes : sequence of blysk.sim.meshes.mesh.LoadedMesh
         The meshes.
     models, exponents : sequences
-        Reflection models and exponents. An exponent is a frame constant, and needs no pipeline of its own.
+        Reflection models and exponents. An exponent is a frame constant, so it needs no further pipeline.
     width, height : int
         Size of a frame.
     method : str

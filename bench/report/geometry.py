@@ -1,8 +1,8 @@
 """The report's section on triangles: whole designs compared, from triangles to pixels, and stiff cases.
 
-The method is ``quotient``, which takes a vector and its step. It has two rivals. ``quadratic`` needs unit
-normals at the ends of each span. ``renormalise`` takes the unchanged line between the ends, and normalises at
-every pixel.
+The first method is ``quotient``. A span brings a vector and the step of the vector. ``quotient`` has two
+rivals. ``quadratic`` needs unit normals at the ends of each span. ``renormalise`` takes the unchanged line
+between the ends, and normalises at every pixel.
 """
 
 from collections.abc import Iterator, Mapping, Sequence
@@ -69,9 +69,10 @@ def measure(design: str, triangles: Sequence[int], size: Sequence[int]) -> dict[
     Returns
     -------
     dict
-        ``multipliers``, ``geometry_multipliers``, ``register_bits`` and ``memory_bits``, without the memory
-        of depths, before synthesis; and of each frame in ``frames`` ``triangles``, ``spans``, ``pixels``,
-        ``cycles``, and the figures of `frame_figures`, with ``errors`` by exponent in place of ``error``.
+        - ``multipliers``, ``geometry_multipliers``, ``register_bits`` and ``memory_bits``, before synthesis
+          and without the memory of depths;
+        - ``frames``: for each frame ``triangles``, ``spans``, ``pixels``, ``cycles`` and the figures of
+          `frame_figures`. In place of ``error`` there are ``errors`` by exponent.
     """
     renderer, size = Renderer(CANDIDATES[design]), tuple(size)
     unit = RendererUnit(renderer)
@@ -100,7 +101,10 @@ def _scene(triangles: int, size: tuple[int, int], exponent: int) -> Scene:
 
 
 def tasks(quick: bool) -> list[Task]:
-    """Tasks of each design and of each method's stiff cases. Quick: compact designs, small pictures."""
+    """Tasks of each design and of each method's stiff cases.
+
+    A quick report has only compact designs and small pictures.
+    """
     settings = {
         "triangles": list(_TRIANGLES[:2] if quick else _TRIANGLES),
         "size": [160, 120] if quick else [640, 480],
@@ -110,7 +114,7 @@ def tasks(quick: bool) -> list[Task]:
 
 
 def section(tasks: Sequence[Task], results: Sequence[Any]) -> Section:
-    """The section: costs and cycles by triangle size, the best design by size, and the stiff cases."""
+    """The section: costs of the designs, cycles by the size of triangles, and the stiff cases."""
     designs, cases, size = {}, {}, None
     for task, result in zip(tasks, results, strict=True):
         if "design" in task.settings:

@@ -32,10 +32,15 @@ def frame_figures(scene: Scene, renderer: Renderer, frame: TriangleFrame) -> dic
     Returns
     -------
     dict
-        Numbers of pixels: ``pixels`` show a triangle in either frame, ``coverage`` in only one frame;
-        ``other`` show another triangle; ``terminator`` have a light at `TERMINATOR` or less; in ``zero``
-        opposite normals add up to 0, so every normal is right. ``error`` is the largest error of the other
-        pixels in LSB, or ``None`` without such pixels.
+        Numbers of pixels:
+
+        - ``pixels``: a frame shows a triangle there;
+        - ``coverage``: only one of the two frames shows a triangle there;
+        - ``other``: the frames show different triangles there;
+        - ``terminator``: a light has an ``|N.L|`` of at most `TERMINATOR`;
+        - ``zero``: opposite normals add up to 0, so every normal is right.
+
+        ``error`` is the largest error of the remaining pixels in LSB. It is ``None`` if no pixels remain.
     """
     raster = rasterise(scene)
     which = np.flatnonzero(raster.visible)
@@ -71,7 +76,7 @@ def measure_cases(method: str, quick: bool) -> list[dict[str, Any]]:
     method : str
         Method of shading, with the model `blinn`.
     quick : bool
-        Whether the case of a million triangles has a hundredth of them.
+        Whether the case of a million triangles has only a hundredth of this number.
 
     Returns
     -------
@@ -125,7 +130,7 @@ def _scene(
 def _fan(degrees: float) -> np.ndarray:
     """Normals of three corners.
 
-    Two are turned by half of the angle to the left and to the right. The third is upright.
+    Two normals are turned by half of the angle, to the left and to the right. The third normal is upright.
     """
     half = np.radians(degrees) / 2
     return np.array([(-np.sin(half), 0, np.cos(half)), (np.sin(half), 0, np.cos(half)), (0, 0.1, 1)])
@@ -145,7 +150,7 @@ def _facing(rng: np.random.Generator, count: int) -> np.ndarray:
 
 
 def _slivers(rng: np.random.Generator, width: float) -> Scene:
-    """Long triangles of a width in all directions, each counterclockwise."""
+    """Long triangles of a given width in all directions. The corners of each are anticlockwise."""
     angle, count = rng.uniform(0, 2 * np.pi, 400), 400
     along = np.stack([np.cos(angle), np.sin(angle)], axis=1)
     across = np.stack([-along[:, 1], along[:, 0]], axis=1)
@@ -157,7 +162,7 @@ def _slivers(rng: np.random.Generator, width: float) -> Scene:
 
 
 def _smallest(rng: np.random.Generator) -> Scene:
-    """Triangles with corners on neighbouring points of the grid, about a pixel's centre."""
+    """Triangles with corners on neighbouring points of the grid, at the centre of a pixel."""
     count, step = 400, 1 / 256
     centre = rng.permuted(np.stack(np.meshgrid(*2 * [np.arange(-30, 30)]), axis=-1).reshape(-1, 2))[:count]
     # The pixel's centre is the corner between the left and the top edge.
@@ -183,7 +188,7 @@ def _tied() -> Scene:
 
 
 def _deep() -> Scene:
-    """A perspective in which a triangle reaches from before the viewer to far behind."""
+    """A triangle in perspective that reaches from near the viewer to far away."""
     vertices = np.array([(-0.5, -0.4, 0), (0.5, -0.4, 0), (0, 600, -999)])
     mesh = Mesh(vertices, np.array([(0, 1, 2)]), normalise(np.tile([(0.1, 0.3, 1.0)], (3, 1))))
     camera = Camera((0, 0, 1), (0, 0, 0), projection="perspective", field_of_view=60)

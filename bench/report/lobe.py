@@ -91,8 +91,8 @@ def largest_error(lobe: Lobe, parameter: float | None, samples: int = 256) -> fl
     parameter : float or None
         Parameter of the model.
     samples : int
-        Sampled operands in each step of the table, with the first and the last. A smaller step has all
-        operands.
+        Sampled operands in each step of the table, the first and the last operand among them. A step with
+        fewer operands has all operands.
     """
     knots = np.ldexp(lobe.knots, lobe.fraction_bits).astype(np.int64)
     first, last = knots[:-1, np.newaxis], knots[1:, np.newaxis] - 1
@@ -105,7 +105,7 @@ def largest_error(lobe: Lobe, parameter: float | None, samples: int = 256) -> fl
 
 
 def errors_of_size(octaves: int, steps: int, samples: int = 256) -> list[list[float]]:
-    """Largest errors of a table size for each of `CASES`, see `largest_error`."""
+    """Largest errors of a size of the table, for each of `CASES`, see `largest_error`."""
     lobe = Lobe(BLINN, "one_minus_cosine", octaves, steps)
     return [
         [
@@ -173,7 +173,7 @@ def frame_errors(
     method : str
         Method of interpolation.
     model : str
-        One of `MODELS` or `LOBES`, or with ``quotient`` of `MIRROR_LOBES`.
+        A key of `MODELS` or `LOBES`. With ``quotient`` also a key of `MIRROR_LOBES`.
     values : sequence of float
         Exponents, or roughnesses if the model takes them.
     size : two ints
@@ -182,10 +182,13 @@ def frame_errors(
     Returns
     -------
     list of dict
-        For each value ``units``: error against method and model in float64; ``total``: error against the
-        exact frame, with Blinn's model, or with the model itself if it has a table; ``total_spans``: the same
-        error of the method in exact arithmetic with the exact model; ``everywhere``: the total error at
-        any N·L.
+        For each value:
+
+        - ``units``: error against method and model in float64;
+        - ``total``: error against the exact frame. This frame has Blinn's model, or the model itself if the
+          model comes from a table;
+        - ``total_spans``: the total error of the method in exact arithmetic with the exact model;
+        - ``everywhere``: the total error at any N·L.
     """
     design, surface, found = preset(method, model), mesh_of(mesh), []
     target = design.specular.reflection if design.loads_tables else BLINN

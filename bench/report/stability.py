@@ -59,7 +59,7 @@ def tasks(quick: bool) -> list[Task]:
 
 
 def section(tasks: Sequence[Task], results: Sequence[Any]) -> Section:
-    """The section: grades of every method in every group, its safe range, and every case."""
+    """The section: grades of every method in every group, the safe range of each method, and every case."""
     found: dict[str, dict[str, Any]] = {}
     for task, result in zip(tasks, results, strict=True):
         found.setdefault(task.function.__name__, {})[task.settings["method"]] = result
@@ -144,7 +144,7 @@ def _worst(figures: Sequence[dict], way: str) -> tuple[float | None, Grade]:
 
 
 def _stream_cell(cases: Sequence[dict] | None) -> tuple[float | None, Grade]:
-    """Cell of the simulated group: the number of wrong pixels in place of LSB. Each is a bad error."""
+    """Cell of the simulated group: a number of wrong pixels in place of LSB. Any wrong pixel is bad."""
     if cases is None:
         return None, ""
     if any(case["wrong"] is None for case in cases):
@@ -156,7 +156,7 @@ def _stream_cell(cases: Sequence[dict] | None) -> tuple[float | None, Grade]:
 def _matrix(name, title, methods, worst, note) -> Table:
     def colored(group, method) -> Grade:
         error, grade = worst[group, method]
-        # A pixel that differs from the model's is always a bad error.
+        # In the simulated group any pixel that differs from the model is a bad error.
         return grade if group == STREAM_GROUP else _magnitude(error)
 
     def marked(group, method) -> Mark:
@@ -183,7 +183,7 @@ def _magnitude(error: float | None) -> Grade:
 
 
 def _shown(rows: Sequence[Sequence], grades: Sequence[Sequence[Grade]]) -> dict[str, Any]:
-    """Grades and marks of a table. Colours follow the error of a graded cell, marks its grade."""
+    """Grades and marks of a table. The error of a graded cell gives the colour, and its grade the mark."""
     return {
         "grades": [
             [_magnitude(cell) if grade else "" for cell, grade in zip(row, of, strict=True)]

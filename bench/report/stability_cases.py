@@ -43,10 +43,10 @@ GROUPS = {
     9: "triangles without area, slivers, triangles at the edges",
     10: "intensities over 1, many lights",
 }
-"""Groups of cases by number: the quantity that is extreme."""
+"""Groups of cases by number. The text is the quantity that is extreme."""
 
 STREAM_GROUP = 8
-"""The simulated group."""
+"""The group whose cases are simulated."""
 
 EXPONENTS = (1, 2, 3, 10, 100, 500, 1000)
 
@@ -72,14 +72,14 @@ class Case:
     group : int
         One of `GROUPS`.
     name : str
-        Description of its extreme property.
+        Description of the extreme property.
     scene : Scene
         Size, material, lights and viewer.
     raster : Raster
-        The spans. They cover every pixel of their reference picture once.
+        The spans. They cover every pixel of the reference picture once.
     codes : pair of int arrays, shape (spans, 3), optional
-        Codes of the end normals for the pipeline, if the normals are not of unit length. The raster's normals
-        are then the values of these codes.
+        Codes of the end normals for the pipeline, if the normals are not of unit length. The normals of the
+        raster are then the values of these codes.
     """
 
     group: int
@@ -135,11 +135,11 @@ def single_spans(
     colors: tuple = _COLORS,
     codes: tuple[np.ndarray, np.ndarray] | None = None,
 ) -> Case:
-    """A case of single spans, each in a row of its own."""
+    """A case of single spans. Each row of the picture has one span."""
     left, right = ends
     count = len(left)
     length = np.broadcast_to(length, count).astype(np.int32)
-    # A pixel alone has one normal.
+    # A span of one pixel has a single normal.
     right = np.where(length[:, np.newaxis] == 1, left, right)
     span, offset = pixels_of(length)
     width = int(length.max())
@@ -190,7 +190,7 @@ def cases_of(group: int) -> Iterator[Case]:
     match group:
         case 1:
             for exponent in EXPONENTS:
-                # To where the highlight ends.
+                # Up to the end of the highlight.
                 off = rng.uniform(0, min(60, 120 / exponent**0.5), 100)
                 ends = arcs(rng, HALFWAY, rng.uniform(0, 44.9, 100), rng.uniform(-0.5, 1.5, 100), off)
                 yield single_spans(1, f"exponent {exponent}", ends, rng.integers(2, 41, 100), exponent)
@@ -244,8 +244,7 @@ def _light_cases(rng) -> Iterator[Case]:
     side = np.array([1.0, 0.0, 0.0])
     for degrees in (1e-3, 20):
         for exponent in (1, 100):
-            # Most normals begin on the light's side, pass the right angle to the light, and end on the other
-            # side.
+            # Along most spans the normals begin on the side of the light, and end on the other side.
             ends = arcs(rng, viewer, np.full(40, degrees))
             light = normalise(side + np.radians(degrees / 8) * viewer)
             name = f"terminator in a span of {degrees:g} degrees, exponent {exponent}"

@@ -63,19 +63,23 @@ GOOD = 1.0
 """Largest good error, in LSB."""
 
 LENGTH_TOLERANCE = 1 / 256
-"""Largest distance of a normal's length from 1, by the methods' documentation."""
+"""Largest distance of a normal's length from 1 that the documentation of the methods allows."""
 
 _STEP = COMPONENT.step
 
 # Degrees by which rounding makes a span wider.
 _SLACK = 1e-3
 
-# LSB: rounding of an ambient, diffuse and specular colour operand.
+# Error in LSB by the rounding of three colour operands: ambient, diffuse and specular.
 _COLOR_ERROR = 3 * Intensity.COLOR_FORMAT.step / 2
 
 
 class _Shaded(NamedTuple):
-    """Largest error of a channel, stated error (in LSB) and span of each shown pixel, and spans' flags."""
+    """Results of a case.
+
+    Each shown pixel has the largest error of a channel and the stated error, in LSB, and the index of its
+    span. Each span has a flag if it is out of range.
+    """
 
     error: np.ndarray
     stated: np.ndarray
@@ -88,7 +92,7 @@ def _design(case: Case, method: str) -> ShadingPipeline:
 
 
 def spans_of(case: Case, design: ShadingPipeline, raster: Raster) -> Spans:
-    """Spans of a case for a design, made by `spans_for` or from the case's own codes."""
+    """Spans of a case for a design, made by `spans_for`, or from the codes of the case if it has codes."""
     if case.codes is None:
         return spans_for(case.scene, raster, design)
     return design.interpolator.filled(_OfCodes(case, design, raster))
@@ -96,7 +100,7 @@ def spans_of(case: Case, design: ShadingPipeline, raster: Raster) -> Spans:
 
 @dataclass(frozen=True)
 class _OfCodes:
-    """Fills spans with a case's own codes of normals at the ends, see `SpanFiller`."""
+    """Fills spans with the codes of normals of a case, see `SpanFiller`."""
 
     case: Case
     design: ShadingPipeline
@@ -107,7 +111,7 @@ class _OfCodes:
         return Spans(raster.x, raster.y, raster.length, *self.case.codes)
 
     def with_lines(self) -> Spans:
-        # The same numbers.
+        # Both formats give the same numbers.
         shift = self.design.interpolator.END_FORMAT.fraction_bits - COMPONENT.fraction_bits
         left, right = self.case.codes
         return replace(self.with_normals(), normal_left=left << shift, normal_right=right << shift)
@@ -121,13 +125,13 @@ class _OfCodes:
 
 
 def _between(raster: Raster, left: np.ndarray, right: np.ndarray) -> Raster:
-    """The same spans with other ends."""
+    """The same spans with other end normals."""
     return replace(raster, normal_left=left.astype(np.float64), normal_right=right.astype(np.float64))
 
 
 @dataclass(frozen=True)
 class _OwnCurve:
-    """Shades a case by the method's own curve in float64, from the codes of the spans; see `ExactShading`."""
+    """Shades a case by the method's curve in float64, from the codes of the spans. See `ExactShading`."""
 
     case: Case
     design: ShadingPipeline
@@ -154,7 +158,10 @@ class _OwnCurve:
 
 
 def _shade(case: Case, design: ShadingPipeline, raster: Raster) -> _Shaded:
-    """Errors of the bit-accurate model against exact normals: perspective-correct, normalised per pixel."""
+    """Errors of the bit-accurate model against exact normals.
+
+    Exact normals are perspective-correct, and normalised at every pixel.
+    """
     scene, material = case.scene, case.scene.materials[0]
     spans, (constants,) = spans_of(case, design, raster), constants_of(scene, design)
     color = design.compute(spans, constants).color
@@ -172,7 +179,7 @@ def _shade(case: Case, design: ShadingPipeline, raster: Raster) -> _Shaded:
     direction = np.array([light.direction for light in scene.lights])
     halfway = halfway_vector(direction, scene.camera.viewer)
     cosine, highlight = (normals @ vectors.T for vectors in (direction, halfway))
-    # If N·L is 0 except for errors of the arithmetic, both sides of the terminator are right.
+    # If N·L is 0 within the error of the arithmetic, both sides of the terminator are right.
     near = np.abs(cosine) <= error + 3 * _STEP
     exact = [
         saturate(
@@ -208,7 +215,7 @@ def _angles(raster: Raster) -> np.ndarray:
 
 
 def _line_angles(spans: Spans) -> np.ndarray:
-    """Angle of a span with ends of length 1 and a chord as near to 0 as the span's line, in degrees."""
+    """Angles, in degrees, of spans with unit normals whose chord is as near to 0 as the line of each span."""
     left, right = (
         codes / Renormaliser.VECTOR_FORMAT.max_code for codes in (spans.normal_left, spans.normal_right)
     )
@@ -228,7 +235,7 @@ def _has_unit_length(design: ShadingPipeline, codes: Sequence[np.ndarray]) -> np
 
 
 def _length_excess(codes: Sequence[np.ndarray]) -> float:
-    """Largest distance of a normal's length from 1. 0 if rounding explains it."""
+    """Largest distance of a normal's length from 1. The result is 0 if rounding explains the distance."""
     lengths = np.linalg.norm(np.concatenate(codes) / ONE, axis=1)
     excess = float(np.abs(lengths - 1).max(initial=0))
     return excess if excess > 2 * _STEP else 0.0
@@ -264,15 +271,15 @@ def _figures(shaded: _Shaded, inside: np.ndarray) -> dict[str, Any]:
 def measure_case(case: Case, method: str) -> dict[str, Any]:
     """Errors of a method in a case, by the bit-accurate model.
 
-    The error is the largest of a channel against exact normals of each pixel in float64 with the same
-    model, in LSB; 0.5 is a correctly rounded pixel. Where N·L is 0 within the stated errors, lit and dark
-    are both right. An error is
+    The error is the largest error of a channel in LSB. The reference has exact normals of each pixel in
+    float64, with the same model. A correctly rounded pixel has 0.5 LSB. Where N·L is 0 within the stated
+    errors, lit and dark are both right. An error is
 
     - good up to `GOOD`;
     - fair if it is larger, but the pipeline flags the span, or the method serves the span and states the
-      error. A stated error is at most the error of the method's own curve in float64 plus the error bounds of
-      its units. In a highlight these count times the exponent;
-    - bad otherwise, because nothing tells of it.
+      error. A stated error is at most the error of the method's curve in float64, plus the error bounds of
+      its units. In a highlight the bounds count times the exponent;
+    - bad if it is larger, and nothing tells of it.
 
     A method serves a span that `cut_spans` leaves whole. A method that takes two normals and has no span
     limit serves spans up to its `Interpolator.widest_span`. Normals have length 1 within `LENGTH_TOLERANCE`.
@@ -281,11 +288,15 @@ def measure_case(case: Case, method: str) -> dict[str, Any]:
     Returns
     -------
     dict
-        ``case``; number of ``spans``; number of spans ``inside``, which the method serves; number of ``cut``
-        spans. ``given`` and ``prepared`` are dictionaries for the spans as given, and for the spans after
-        cuts. They have ``error``; ``silent``, the error in spans without a flag; ``safe``, the error in
-        served spans; ``flagged``, the number of flagged spans; ``grade``, and ``safe_grade`` of served spans.
-        ``prepared`` is ``None`` if the case has its own codes.
+        - ``case``: its name;
+        - ``spans``: number of spans, ``inside``: number of spans that the method serves, ``cut``: number of
+          spans that are cut;
+        - ``given`` and ``prepared``: dictionaries for the spans as given, and for the spans after cuts.
+          ``prepared`` is ``None`` if the case has codes.
+
+        These dictionaries have ``error``; ``silent``, the error in spans without a flag; ``safe``, the error
+        in served spans; ``flagged``, the number of flagged spans; ``grade``; and ``safe_grade`` of the served
+        spans.
     """
     design = _design(case, method)
     by_angle = design.interpolator.brings_ends and not design.interpolator.curve_is_exact
@@ -342,8 +353,8 @@ def _flags(method: str, degrees: np.ndarray) -> np.ndarray:
 def widest_span(method: str, exponent: int) -> float:
     """Widest span in degrees that a method serves.
 
-    For ``chord-local`` and ``quotient`` it is the widest angle at which no span of a sample is cut. For other
-    methods it is the widest span that is not cut.
+    For ``chord-local`` and ``quotient`` this is the widest angle at which no span of a sample is cut. For
+    other methods it is the widest span that is not cut.
     """
     design = preset(method, model_of(method))
     if design.interpolator.brings_ends:
@@ -363,10 +374,12 @@ def measure_ranges(method: str) -> dict[str, Any]:
     Returns
     -------
     dict
-        ``widest``: widest span in degrees at each of `RANGE_EXPONENTS`; ``none_flagged``: largest whole
-        number of degrees up to which no span is flagged; ``all_flagged``: the least from which all are;
-        ``sweep``: `measure_case` of spans at each angle of `SWEEP` and `SWEEP_EXPONENT`; ``outside``: the
-        same at `FACTORS` times the widest span, with ``factor`` and ``degrees``.
+        - ``widest``: widest span in degrees at each of `RANGE_EXPONENTS`;
+        - ``none_flagged``: largest whole number of degrees up to which no span is flagged;
+        - ``all_flagged``: least whole number of degrees from which all spans are flagged;
+        - ``sweep``: `measure_case` of spans at each angle of `SWEEP` and `SWEEP_EXPONENT`;
+        - ``outside``: `measure_case` of spans of `FACTORS` times the widest span, with ``factor`` and
+          ``degrees``.
     """
     sweep = [measure_case(_span_case(degrees, SWEEP_EXPONENT), method) for degrees in SWEEP]
     angles = np.arange(181)
