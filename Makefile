@@ -69,7 +69,6 @@ bench: $(VENV)/.installed-bench
 	$(BIN)/blysk bench report
 	$(BIN)/python -m blysk.bench.speed.engines
 	$(BIN)/python -m blysk.bench.speed.renderer
-	$(BIN)/python -m blysk.bench.report.gate
 
 pages: $(VENV)/.installed
 	mkdir -p build/pages

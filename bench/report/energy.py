@@ -10,18 +10,40 @@ from typing import Any
 import numpy as np
 
 from blysk.bench.accuracy import scene_for
-from blysk.bench.report.gate import METHOD, METHODS, MODELS, frames, same_pixels
 from blysk.bench.report.section import Cell, Drawing, Grade, Section, Table
 from blysk.bench.store import Task
 from blysk.bench.svg import svg
 from blysk.golden.frames.prepare import prepare
+from blysk.golden.pipeline import Pixels
+from blysk.golden.presets import METHODS as ALL_METHODS
 from blysk.golden.presets import preset
 from blysk.hdl.pipeline import ShadingPipelineUnit
+from blysk.sim.engines.simulate import Run, simulate
 from blysk.sim.engines.toggles import ToggleCounter
+from blysk.sim.frames.frame import beats_of
 from blysk.sim.meshes.teapot import teapot
 
-__all__ = ["BLOCKS", "DESIGN", "EXPONENTS", "by_block", "measure", "section", "tasks"]
+__all__ = [
+    "BLOCKS",
+    "DESIGN",
+    "EXPONENTS",
+    "METHOD",
+    "METHODS",
+    "MODELS",
+    "by_block",
+    "measure",
+    "same_pixels",
+    "section",
+    "tasks",
+]
 
+METHODS = tuple(name for name, of in ALL_METHODS.items() if of.serves_gate and of.ORIGIN != "own")
+"""Methods of unit normals, which serve the gate: linear, and the methods of the documents."""
+
+METHOD = "quadratic"
+"""Method of `METHODS` that has every model."""
+
+MODELS = ("cosquad", "coscos4", "blinn_product")
 EXPONENTS = (2, 50, 1000)
 
 BLOCKS: dict[str, tuple[str, ...]] = {
@@ -72,6 +94,13 @@ def by_block(toggles: dict[str, int]) -> dict[str, int]:
     return totals
 
 
+def same_pixels(run: Run, expected: Pixels) -> bool:
+    """Whether a run's pixels are as expected, in order: coordinates, colour, mark of a span's end."""
+    fields = {name: getattr(expected, name) for name in ("x", "y", "last")}
+    fields |= {name: expected.color[:, channel] for channel, name in enumerate("rgb")}
+    return all(np.array_equal(run.beats[name], codes) for name, codes in fields.items())
+
+
 def measure(
     method: str, model: str, gate: bool, exponents: Sequence[int], size: Sequence[int], engine: str
 ) -> list[dict[str, Any]]:
@@ -105,11 +134,12 @@ def measure(
         scene = scene_for(mesh, exponent, width, height)
         prepared = prepare(scene, design)
         spans, (constants,) = prepared.spans, prepared.constants
-        [run] = frames([counter], spans, constants, engine)
+        beats, pixels = beats_of(counter, spans), int(np.sum(spans.length))
+        run = simulate(counter, beats, count=pixels, write=constants.writes(), engine=engine)
         results.append(
             {
                 "spans": len(spans),
-                "pixels": int(np.sum(spans.length)),
+                "pixels": pixels,
                 "cycles": run.total_cycles,
                 "toggles": {path: int(run.status[path]) for path in run.status.dtype.names},
                 "same": same_pixels(run, design.compute(spans, constants)),

@@ -1,14 +1,31 @@
 # amaranth: UnusedElaboratable=no
 """Toggled register bits by block: every register in one of them, and what the section makes of the counts."""
 
+from types import SimpleNamespace
+
+import numpy as np
 import pytest
 
-from blysk.bench.report.energy import BLOCKS, DESIGN, EXPONENTS, by_block, measure, section, tasks
-from blysk.bench.report.gate import METHOD, METHODS, MODELS
+from blysk.bench.accuracy import scene_for
+from blysk.bench.report.energy import (
+    BLOCKS,
+    DESIGN,
+    EXPONENTS,
+    METHOD,
+    METHODS,
+    MODELS,
+    by_block,
+    measure,
+    same_pixels,
+    section,
+    tasks,
+)
 from blysk.bench.report.section import Drawing, Table
+from blysk.golden.frames.prepare import prepare
 from blysk.golden.presets import preset
 from blysk.hdl.pipeline import ShadingPipelineUnit
 from blysk.sim.engines.toggles import ToggleCounter
+from blysk.sim.meshes.teapot import teapot
 
 
 def test_every_register_of_the_default_is_in_a_block():
@@ -119,3 +136,19 @@ def test_tasks():
     results = [[frame(top=10), frame(top=20), frame(top=40 - 20 * task.settings["gate"])] for task in full]
     made = section(full, results)
     assert len(made.parts[0].rows) == len(full) * len(EXPONENTS)
+
+
+def test_a_pixel_that_differs_is_found():
+    design = preset("quadratic", "cosquad")
+    prepared = prepare(scene_for(teapot(300), 50, 40, 30), design)
+    pixels = design.compute(prepared.spans, prepared.constants[0])
+    names = ("x", "y", "r", "g", "b", "last")
+    beats = np.zeros(len(pixels.x), [(name, np.int64) for name in names])
+    for name, codes in zip(names, (pixels.x, pixels.y, *pixels.color.T, pixels.last), strict=True):
+        beats[name] = codes
+    assert same_pixels(SimpleNamespace(beats=beats), pixels)
+    for name in names:
+        wrong = beats.copy()
+        wrong[name][-1] ^= 1
+        assert not same_pixels(SimpleNamespace(beats=wrong), pixels)
+    assert not same_pixels(SimpleNamespace(beats=beats[:-1]), pixels)
