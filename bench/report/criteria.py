@@ -215,7 +215,7 @@ _DOCUMENT = Document(
     [
         "[T] 1.3 lists criteria of a shading method. This section answers them for the default pipeline: "
         f"`{_METHOD}` with `{_MODEL}`, one light and exponent {_EXPONENT}. The section *Energy proxy* "
-        "treats energy. The section *More than one pixel a cycle* treats several pipelines.",
+        "treats energy.",
         "The cycle model gives the cycles, from the first write of a constant to the last pixel. A table "
         "compares the model with simulation. Place and route on one device, out of context, gives the "
         "clock rate. We assume that geometry and frame buffer keep up. The pipeline counts in `status` the "

@@ -464,8 +464,8 @@ _DOCUMENT = Document(
             "A figure above 1 means that the unit of [T] takes less. Cells are operators, multiplexers, "
             "registers and memories of any width, before technology mapping. An interpolator includes its "
             "setup, and gives N·L and N·H of one light. A dash means that the unit has none of the "
-            "resource. The section *Units, one by one* has each unit's own figures. The sections *The "
-            "documents' criteria* and *Place and route* have cycles and clock rates of whole pipelines.",
+            "resource. `blysk blocks` prints each unit's own figures. The sections *The documents' criteria* "
+            "and *Place and route* have cycles and clock rates of whole pipelines.",
             {"multipliers": "multipliers", "cells": "cells", "register bits": "register_bits"},
         ),
         ClaimTable(

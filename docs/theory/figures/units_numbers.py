@@ -9,8 +9,8 @@ import numpy as np
 from markdown import table
 
 from blysk.bench.accuracy import scene_for
+from blysk.bench.lobe_errors import CASES, errors_of_size
 from blysk.bench.report.errata import second_lobe
-from blysk.bench.report.lobe import CASES, errors_of_size
 from blysk.bench.surfaces import sphere
 from blysk.golden.frame_constants import FrameConstants
 from blysk.golden.frames.compare import compare_image

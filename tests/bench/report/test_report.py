@@ -12,7 +12,8 @@ import pytest
 from click.testing import CliRunner
 
 from blysk.bench.cli.bench import command
-from blysk.bench.report import frames, report, sections, units
+from blysk.bench.lobe_errors import errors_of_size
+from blysk.bench.report import frames, report, sections
 from blysk.bench.report.page import AXES, environment, page, shown
 from blysk.bench.report.report import about, check_folder, write_report
 from blysk.bench.report.section import Section, Table
@@ -175,19 +176,19 @@ def test_a_folder_that_may_not_be_written_is_refused(tmp_path, monkeypatch):
 
 
 class Fake:
-    """A section's module: the dot product's line, some times."""
+    """A section's module: the errors of a small table, some times."""
 
     def __init__(self, section, count=2):
         self._section, self._count = section, count
 
     def tasks(self, quick, **further):
         assert further in ({}, {"meshes": ("a.obj", "b.obj")})
-        settings = {"unit": "dot_product", "variant": ""}
-        return [Task(units.measure, {**settings, "samples": 1000 + k}) for k in range(self._count)]
+        settings = {"octaves": 2, "steps": 2}
+        return [Task(errors_of_size, {**settings, "samples": 2 + k}) for k in range(self._count)]
 
     def section(self, tasks, results):
-        assert [task.settings["samples"] for task in tasks] == [1000 + k for k in range(self._count)]
-        assert [result["unit"] for result in results] == ["dot_product"] * self._count
+        assert [task.settings["samples"] for task in tasks] == [2 + k for k in range(self._count)]
+        assert [len(result) for result in results] == [3] * self._count
         return self._section
 
 

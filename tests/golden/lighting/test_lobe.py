@@ -7,7 +7,7 @@ from fractions import Fraction
 import numpy as np
 import pytest
 
-from blysk.bench.report.lobe import CASES, largest_error
+from blysk.bench.lobe_errors import CASES, largest_error
 from blysk.golden.lighting.lobe import Lobe, LobeTable
 from blysk.golden.lighting.power import Power
 from blysk.golden.number.fixed import UQ, Fixed
