@@ -12,7 +12,7 @@ import numpy as np
 
 from blysk.bench.colors import style_of
 from blysk.bench.report.section import Drawing, Grade, Mark, Section, Table
-from blysk.bench.report.stability_cases import GROUPS, STREAM_GROUP
+from blysk.bench.report.stability_cases import GROUPS
 from blysk.bench.report.stability_conclusion import conclusion
 from blysk.bench.report.stability_errors import (
     FACTORS,
@@ -24,7 +24,6 @@ from blysk.bench.report.stability_errors import (
     measure,
     measure_ranges,
 )
-from blysk.bench.report.stability_streams import measure_stream
 from blysk.bench.store import Task
 from blysk.bench.svg import svg
 from blysk.golden.lighting.specular import MAX_EXPONENT
@@ -32,14 +31,10 @@ from blysk.golden.number.spans import LENGTH_BITS
 from blysk.golden.presets import METHODS
 
 __all__ = [
-    "QUICK_SIMULATED",
     "section",
     "tasks",
 ]
 
-
-QUICK_SIMULATED = ("renormalise", "quotient")
-"""Methods that the quick report simulates."""
 
 _LIMITS: dict[Grade, float] = {"good": GOOD, "fair": 4.0, "poor": 16.0}
 """Largest error of each colour, in LSB. Larger errors are bad."""
@@ -48,14 +43,9 @@ _MARKS: dict[Grade, Mark] = {"fair": "stated", "bad": "silent"}
 
 
 def tasks(quick: bool) -> list[Task]:
-    """Measurements of every method in every case, and simulations of every method.
-
-    If quick, only the methods of `QUICK_SIMULATED` are simulated.
-    """
-    simulated = QUICK_SIMULATED if quick else METHODS
+    """Measurements of every method in every case. A quick report has all of them, too."""
     settings = [{"method": method} for method in METHODS]
-    result = [Task(function, each) for function in (measure, measure_ranges) for each in settings]
-    return result + [Task(measure_stream, {"method": method, "quick": quick}) for method in simulated]
+    return [Task(function, each) for function in (measure, measure_ranges) for each in settings]
 
 
 def section(tasks: Sequence[Task], results: Sequence[Any]) -> Section:
@@ -63,21 +53,16 @@ def section(tasks: Sequence[Task], results: Sequence[Any]) -> Section:
     found: dict[str, dict[str, Any]] = {}
     for task, result in zip(tasks, results, strict=True):
         found.setdefault(task.function.__name__, {})[task.settings["method"]] = result
-    cases, ranges, streams = (
-        found.get(function.__name__, {}) for function in (measure, measure_ranges, measure_stream)
-    )
+    cases, ranges = (found.get(function.__name__, {}) for function in (measure, measure_ranges))
     methods = list(cases)
     worst = {
         way: {
             (group, method): _worst([case[way] for case in cases[method][str(group)] if case[way]], way)
             for group in GROUPS
-            if group != STREAM_GROUP
             for method in methods
         }
         for way in ("prepared", "given")
     }
-    for of in worst.values():
-        of.update({(STREAM_GROUP, method): _stream_cell(streams.get(method)) for method in methods})
     tables = [
         _matrix(
             "stability",
@@ -101,12 +86,11 @@ def section(tasks: Sequence[Task], results: Sequence[Any]) -> Section:
     everything = [case for method in methods for group in cases[method].values() for case in group]
     safe = [case["given"] for case in everything if case["inside"]]
     unsafe = sum(case["safe_grade"] == "bad" for case in safe)
-    runs = [case for method in streams for case in streams[method]]
     text = [
         f"This section tests {len(methods)} methods in {sum(map(len, cases[methods[0]].values()))} stiff and "
         f"extreme cases of {len(GROUPS)} groups. The bit-accurate model computes the pixels, and the "
         "simulated hardware equals it to the bit. The reflection model is `cosquad`, but `blinn` for "
-        f"`quotient`. Group {STREAM_GROUP} is simulated hardware. Each pixel is compared with exact normals "
+        "`quotient`. Each pixel is compared with exact normals "
         "in float64 with the same model. A correctly rounded pixel has 0.5 LSB. Where N.L is 0 within the "
         "error of the arithmetic, lit and dark are both right.",
         f"The colour of a cell shows its error: up to {GOOD:g} LSB, up to {_LIMITS['fair']:g}, up to "
@@ -124,12 +108,8 @@ def section(tasks: Sequence[Task], results: Sequence[Any]) -> Section:
         + (f", of {_listed(sorted(set(silent), key=methods.index))}" if silent else "")
         + f". {len(safe)} cases have spans that the method serves. In {unsafe} of these cases a served span "
         "is silently wrong.",
-        f"{sum(case['runs'] for case in runs)} simulated runs with stalls, empty spans and resets gave "
-        f"{sum(case['runs'] * case['pixels'] for case in runs):,} pixels. "
-        f"{sum(case['wrong'] or 0 for case in runs):,} of these pixels are wrong."
-        + (f" {halted} cases halted." if (halted := sum(case["wrong"] is None for case in runs)) else ""),
     ]
-    parts = [*tables, _range_table(ranges), _drawing(ranges), _case_table(cases), _stream_table(streams)]
+    parts = [*tables, _range_table(ranges), _drawing(ranges), _case_table(cases)]
     title = "Numerical stability on stiff and extreme cases"
     return Section("stability", title, text, parts, conclusion=conclusion(cases, ranges))
 
@@ -143,24 +123,12 @@ def _worst(figures: Sequence[dict], way: str) -> tuple[float | None, Grade]:
     return max((of[name] for of in figures), default=None), grade_of([of["grade"] for of in figures])
 
 
-def _stream_cell(cases: Sequence[dict] | None) -> tuple[float | None, Grade]:
-    """Cell of the simulated group: a number of wrong pixels in place of LSB. Any wrong pixel is bad."""
-    if cases is None:
-        return None, ""
-    if any(case["wrong"] is None for case in cases):
-        return None, "bad"
-    wrong = sum(case["wrong"] for case in cases)
-    return wrong, "bad" if wrong else "good"
-
-
 def _matrix(name, title, methods, worst, note) -> Table:
     def colored(group, method) -> Grade:
-        error, grade = worst[group, method]
-        # In the simulated group any pixel that differs from the model is a bad error.
-        return grade if group == STREAM_GROUP else _magnitude(error)
+        return _magnitude(worst[group, method][0])
 
     def marked(group, method) -> Mark:
-        return "" if group == STREAM_GROUP else _MARKS.get(worst[group, method][1], "")
+        return _MARKS.get(worst[group, method][1], "")
 
     return Table(
         name,
@@ -168,8 +136,7 @@ def _matrix(name, title, methods, worst, note) -> Table:
         ["group", "extreme quantity", *methods],
         [[group, text, *(worst[group, method][0] for method in methods)] for group, text in GROUPS.items()],
         "Worst case of each group. The colour shows the error. §: stated or flagged. !: nothing tells. "
-        f"Group {STREAM_GROUP} has the number of simulated pixels that differ from the model's. There is no "
-        f"figure if the method was not simulated. {note}",
+        f"{note}",
         [["", "", *(colored(group, method) for method in methods)] for group in GROUPS],
         [["", "", *(marked(group, method) for method in methods)] for group in GROUPS],
     )
@@ -260,19 +227,6 @@ def _case_table(cases: dict[str, dict]) -> Table:
                 grades.append([""] * 8 + shown)
     note = "The preparation refuses a case that has no figures for cut spans."
     return Table("stability-cases", "Every case", columns, rows, note, **_shown(rows, grades))
-
-
-def _stream_table(streams: dict[str, list]) -> Table:
-    rows = [
-        [method, of["case"], of["runs"], of["runs"] * of["pixels"], of["wrong"]]
-        for method, found in streams.items()
-        for of in found
-    ]
-    note = "Simulated hardware is compared with the model: each pixel's coordinates, colour and end of span."
-    columns = ["method", "case", "runs", "pixels", "pixels that differ"]
-    grades = [["", "", "", "", "good" if row[4] == 0 else "bad"] for row in rows]
-    title = f"Group {STREAM_GROUP}: {GROUPS[STREAM_GROUP]}"
-    return Table("stability-stream", title, columns, rows, note, grades)
 
 
 def _drawing(ranges: dict[str, dict]) -> Drawing:

@@ -23,7 +23,6 @@ __all__ = [
     "GROUPS",
     "HALFWAY",
     "LENGTHS",
-    "STREAM_GROUP",
     "Case",
     "arcs",
     "cases_of",
@@ -39,14 +38,10 @@ GROUPS = {
     5: "light at the terminator, behind, at the viewer",
     6: "normals that are not of unit length",
     7: "4095 pixels, largest sums",
-    8: "stalls, spans without a pause, empty spans, reset",
+    8: "intensities over 1, many lights",
     9: "triangles without area, slivers, triangles at the edges",
-    10: "intensities over 1, many lights",
 }
 """Groups of cases by number. The text is the quantity that is extreme."""
-
-STREAM_GROUP = 8
-"""The group whose cases are simulated."""
 
 EXPONENTS = (1, 2, 3, 10, 100, 500, 1000)
 
@@ -225,18 +220,18 @@ def cases_of(group: int) -> Iterator[Case]:
             for name, centre in (("N along L and H", axis), ("N against L and H: 1 - N.H is 2", -axis)):
                 ends = arcs(rng, centre, np.full(4, 44.9), (0.0, 0.5, 0.5, 1.0))
                 yield single_spans(7, name, ends, 4095, MAX_EXPONENT, [Light(tuple(axis))], axis)
-        case 9:
-            yield from _triangle_cases(rng)
-        case 10:
+        case 8:
             ends = about(rng.uniform(0, 40, 60), 20)
             over = (0.5,) * 3, (0.9,) * 3, (0.8,) * 3
-            yield single_spans(10, "k_a + k_d + k_s = 2.2", ends, 20, 20, colors=over)
-            yield single_spans(10, "light of intensity 3", ends, 20, 20, [Light(tuple(_LIGHT), (3.0,) * 3)])
+            yield single_spans(8, "k_a + k_d + k_s = 2.2", ends, 20, 20, colors=over)
+            yield single_spans(8, "light of intensity 3", ends, 20, 20, [Light(tuple(_LIGHT), (3.0,) * 3)])
             around = normalise(_LIGHT + rng.uniform(-0.7, 0.7, (16, 3)))
             for name, share in (("16 lights of intensity 1/16", 1 / 16), ("16 lights of intensity 1", 1.0)):
-                yield single_spans(10, name, ends, 20, 20, [Light(tuple(v), (share,) * 3) for v in around])
+                yield single_spans(8, name, ends, 20, 20, [Light(tuple(v), (share,) * 3) for v in around])
+        case 9:
+            yield from _triangle_cases(rng)
         case _:
-            raise ValueError(f"group {group} has no spans of its own")
+            raise ValueError(f"there is no group {group}")
 
 
 def _light_cases(rng) -> Iterator[Case]:

@@ -11,7 +11,6 @@ from blysk.bench.report.section import Grade
 from blysk.bench.report.stability_cases import (
     GROUPS,
     HALFWAY,
-    STREAM_GROUP,
     Case,
     arcs,
     cases_of,
@@ -325,12 +324,8 @@ def measure_case(case: Case, method: str) -> dict[str, Any]:
 
 
 def measure(method: str) -> dict[str, list[dict[str, Any]]]:
-    """Results of `measure_case` for a method and all cases, by group, without `STREAM_GROUP`."""
-    return {
-        str(group): [measure_case(case, method) for case in cases_of(group)]
-        for group in GROUPS
-        if group != STREAM_GROUP
-    }
+    """Results of `measure_case` for a method and all cases, by group."""
+    return {str(group): [measure_case(case, method) for case in cases_of(group)] for group in GROUPS}
 
 
 def _span_case(degrees: float, exponent: int, count: int = 30) -> Case:

@@ -8,15 +8,13 @@ from functools import lru_cache
 import numpy as np
 import pytest
 
-from blysk.bench.report import stability_streams
 from blysk.bench.report.section import Drawing, Table
-from blysk.bench.report.stability import QUICK_SIMULATED, section, tasks
+from blysk.bench.report.stability import section, tasks
 from blysk.bench.report.stability_cases import (
     ANGLES,
     EXPONENTS,
     GROUPS,
     LENGTHS,
-    STREAM_GROUP,
     Case,
     arcs,
     cases_of,
@@ -31,7 +29,6 @@ from blysk.bench.report.stability_errors import (
     measure_case,
     measure_ranges,
 )
-from blysk.bench.report.stability_streams import measure_stream
 from blysk.bench.store import Task
 from blysk.golden.frame_constants import FrameConstants
 from blysk.golden.frames.cut import split_pairs
@@ -43,7 +40,6 @@ from blysk.golden.reference.renderer import shade_spans
 
 QUICK = ("quotient", "chord-local")
 NAMES = [name if name in QUICK else pytest.param(name, marks=pytest.mark.long) for name in METHODS]
-FROM_SPANS = [group for group in GROUPS if group != STREAM_GROUP]
 
 
 @lru_cache(maxsize=1)
@@ -52,7 +48,7 @@ def cases(group: int) -> list[Case]:
 
 
 @pytest.mark.parametrize("method", NAMES)
-@pytest.mark.parametrize("group", FROM_SPANS)
+@pytest.mark.parametrize("group", GROUPS)
 def test_keeps_what_is_promised(group, method):
     """Nothing silently wrong: not of spans that are cut, nor in the safe range of spans as they come."""
     for case in cases(group):
@@ -93,43 +89,6 @@ def test_quotient_is_given_pairs_as_two():
         np.sort(split.length[split.length > 2]), np.sort(raster.length[raster.length > 2])
     )
     np.testing.assert_array_equal(split.pixel, raster.pixel)
-
-
-@pytest.mark.long
-@pytest.mark.parametrize("method", ["quotient", "bisection", "chord-local"])
-def test_streams(method):
-    """Stalls, empty spans and a reset change no pixel, as `test_units` has it of every method."""
-    found = measure_stream(method, quick=True)
-    assert [case["case"] for case in found] == [
-        "no stalls, with empty spans",
-        "random stalls on both sides",
-        "input mostly stalled",
-        "output mostly stalled",
-        "reset within a span",
-    ]
-    assert all(case["pixels"] > 20 and case["wrong"] == 0 for case in found)
-
-
-@pytest.mark.long
-def test_a_stall_in_every_cycle():
-    found = {case["case"]: case for case in measure_stream("quotient", quick=False)}
-    for side in ("input", "output"):
-        assert found[f"a single stall of the {side}"]["runs"] > 150
-    assert all(case["wrong"] == 0 for case in found.values())
-
-
-def test_wrong_pixels_of_a_stream_are_counted(monkeypatch):
-    compute = ShadingPipeline.compute
-
-    def inverted(self, spans, constants):
-        pixels = compute(self, spans, constants)
-        color = pixels.color.copy()
-        color[:2] ^= 255
-        return dataclasses.replace(pixels, color=color)
-
-    monkeypatch.setattr(ShadingPipeline, "compute", inverted)
-    monkeypatch.setattr(stability_streams, "stream_patterns", lambda unit: [("back to back", {})])
-    assert [case["wrong"] for case in measure_stream("linear", quick=True)] == [2, 2]
 
 
 @pytest.mark.parametrize("places", [slice(None), slice(0, 1)])
@@ -178,7 +137,7 @@ def test_wide_spans_are_told():
 
 
 def test_every_case_is_there():
-    names = [case.name for group in FROM_SPANS for case in cases(group)]
+    names = [case.name for group in GROUPS for case in cases(group)]
     assert len(set(names)) == len(names)
     for texts in (
         [f"exponent {n}" for n in EXPONENTS],
@@ -187,7 +146,7 @@ def test_every_case_is_there():
         ["between two pixels", "L = V", "light behind", "both normals 0", "through the near plane"],
     ):
         assert set(texts) <= set(names)
-    for group in FROM_SPANS:
+    for group in GROUPS:
         # The same again, and every pixel once in the picture that they are held against.
         for case, again in zip(cases(group), cases_of(group), strict=True):
             np.testing.assert_array_equal(case.raster.normal_right, again.raster.normal_right)
@@ -201,8 +160,8 @@ def test_every_case_is_there():
     rows = pixels.reshape(64, 64)
     assert pixels.max() == 1
     assert all(np.count_nonzero(np.diff(np.r_[0, row, 0])) in (0, 2) for row in rows)
-    with pytest.raises(ValueError, match="group 8 has no spans of its own"):
-        list(cases_of(STREAM_GROUP))
+    with pytest.raises(ValueError, match="there is no group 10"):
+        list(cases_of(10))
 
 
 def test_arcs():
@@ -261,22 +220,17 @@ def test_ranges(method):
 def test_section():
     """Of a method's own measurements, through JSON as from the cache."""
     chosen = [task for task in tasks(quick=True) if task.settings["method"] == "quotient"]
-    assert [task.function for task in chosen] == [measure, measure_ranges, measure_stream]
-    stream = [{"case": "back to back", "runs": 3, "pixels": 20, "wrong": 0}]
-    stream.append({"case": "reset", "runs": 2, "pixels": 20, "wrong": None})
-    results = [json.loads(json.dumps(task.run())) for task in chosen[:2]] + [stream]
+    assert [task.function for task in chosen] == [measure, measure_ranges]
+    results = [json.loads(json.dumps(task.run())) for task in chosen]
     made = section(chosen, results)
     assert made.name == "stability"
     tables = {part.name: part for part in made.parts if isinstance(part, Table)}
     assert [part.name for part in made.parts if isinstance(part, Drawing)] == ["stability-angles"]
     for name in ("stability", "stability-as-given"):
         assert [row["group"] for row in tables[name].records()] == list(GROUPS)
-        stalled = tables[name].records()[STREAM_GROUP - 1]
-        assert stalled["quotient"] is None
-        assert tables[name].grades[STREAM_GROUP - 1][-1] == "bad"
     cells = zip(tables["stability"].records(), tables["stability"].grades, strict=True)
     for row, grades in cells:
-        if row["group"] not in (5, STREAM_GROUP):
+        if row["group"] != 5:
             assert row["quotient"] <= GOOD
             assert grades[-1] == "good"
     # Colours follow the error, marks tell what is stated and what is silent.
@@ -290,7 +244,7 @@ def test_section():
             assert (marks[column] == "") == (row[column] <= GOOD)
     assert "`quotient`" in made.conclusion.sentence
     assert "silently wrong in" in made.conclusion.sentence
-    assert len(tables["stability-cases"].rows) == sum(len(cases(group)) for group in FROM_SPANS)
+    assert len(tables["stability-cases"].rows) == sum(len(cases(group)) for group in GROUPS)
     [row] = tables["safe-ranges"].records()
     assert row["method"] == "quotient"
     # It halves spans from 90 degrees on; the search stops within 0.05 degrees.
@@ -324,6 +278,3 @@ def test_tasks():
     assert {task.settings["method"] for task in full} == set(METHODS)
     quick = tasks(quick=True)
     assert {task.settings["method"] for task in quick} == set(METHODS)
-    assert {task.settings["method"] for task in quick if task.function is measure_stream} == set(
-        QUICK_SIMULATED
-    )
