@@ -6,7 +6,7 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from blysk.bench.speed.renderer import timed
+from blysk.bench.speed.renderer_times import timed
 
 __all__ = ["DEAR", "Counted", "dot", "fastest"]
 

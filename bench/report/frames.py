@@ -19,7 +19,7 @@ from blysk.bench.report.perception import (
     perceived,
 )
 from blysk.bench.speed.cycle_model import frame_cycles, unit_of
-from blysk.bench.speed.renderer import timed
+from blysk.bench.speed.renderer_times import timed
 from blysk.golden.frames.border import border_mask
 from blysk.golden.frames.compare import method_in_float64
 from blysk.golden.frames.frame import model_frame

@@ -6,16 +6,11 @@ of the hardware, its picture with two error maps, and the settings that reproduc
 
 import json
 import shlex
-import sys
 from collections.abc import Mapping, Sequence
-from pathlib import Path
 from typing import Any
-
-import click
 
 from blysk.bench.accuracy import model_of
 from blysk.bench.colors import style_of
-from blysk.bench.command import run
 from blysk.bench.report import front, front_scenes, place_and_route
 from blysk.bench.report.frames import (
     ERRORS,
@@ -31,7 +26,7 @@ from blysk.bench.report.frames import (
     view_of,
 )
 from blysk.bench.report.placed import placed
-from blysk.bench.report.points_text import accuracy_table, front_table, fronts_of, table, text
+from blysk.bench.report.points_text import front_table, fronts_of, table, text
 from blysk.bench.report.section import Section
 from blysk.bench.store import Task
 from blysk.bench.tools.families import DEVICE
@@ -39,7 +34,6 @@ from blysk.bench.tools.place_and_route import tool_versions
 from blysk.golden.presets import METHODS, MODELS, PUBLISHED
 from blysk.golden.reference.renderer import SHADINGS
 from blysk.sim.engines.compilers import find_compilers
-from blysk.sim.errors import InputError
 
 __all__ = [
     "BEST",
@@ -358,18 +352,3 @@ def section(tasks: Sequence[Task], results: Sequence[Any]) -> Section:
             },
         },
     )
-
-
-@click.command()
-@click.argument("report", type=click.Path())
-def _print(report):
-    """Print the table of docs/guide/accuracy.md from the report.json of a full report."""
-    try:
-        sections = json.loads(Path(report).read_text(encoding="utf-8"))["sections"]
-        click.echo(accuracy_table(sections["points"]["figures"]["points"]), nl=False)
-    except (OSError, ValueError, KeyError, TypeError):
-        raise InputError(report, "is not a full report", "give the report.json of `blysk bench`") from None
-
-
-if __name__ == "__main__":
-    sys.exit(run(_print, "blysk.bench.report.points", None))

@@ -7,7 +7,6 @@ from typing import Any
 
 import numpy as np
 
-from blysk.bench import accuracy
 from blysk.bench.report.frames import ERRORS, TIMES
 from blysk.bench.report.perception import (
     CIEDE2000_MAX,
@@ -22,7 +21,6 @@ from blysk.golden.frames.border import BORDER
 from blysk.golden.presets import METHODS, MIRROR_LOBES
 
 __all__ = [
-    "accuracy_table",
     "front",
     "front_table",
     "fronts_of",
@@ -279,42 +277,3 @@ def front_table(points: Sequence[Mapping[str, Any]], fronts: Mapping[str, Sequen
         note="Designs on the front. Every design with a smaller error takes more time, and every faster "
         "design has a larger error.",
     )
-
-
-def accuracy_table(points: Sequence[Mapping[str, Any]]) -> str:
-    """The table of docs/guide/accuracy.md, as Markdown: the designs of `DESIGNS`.
-
-    Largest arithmetic and method error in LSB at each exponent; largest total error, cycles a pixel and
-    millions of simulated pixels a second at exponent 100.
-
-    Parameters
-    ----------
-    points : sequence of dict
-        Points of `section`. Every design must be simulated, and exponent 100 be among the exponents.
-    """
-    points = [p for p in points if p["group"] != "software" and "operand" not in p["settings"]]
-    exponents = sorted({point["settings"]["exponent"] for point in points})
-    lines = [
-        "| mesh | method | model | "
-        + " | ".join(f"n = {exponent}" for exponent in exponents)
-        + " | total | cycles a pixel | Mpixel/s simulated |",
-        f"|---|---|---|{'---:|' * (len(exponents) + 3)}",
-    ]
-    rows = {
-        (point["settings"]["source"], point["settings"]["method"], point["settings"]["model"]): {}
-        for point in points
-    }
-    for point in points:
-        settings = point["settings"]
-        rows[settings["source"], settings["method"], settings["model"]][settings["exponent"]] = point
-    for (source, method, model), row in rows.items():
-        if (method, model) not in accuracy.DESIGNS:
-            continue
-        errors = [row[exponent]["errors"] for exponent in exponents]
-        times = row[100]["times"]
-        cells = [Path(source).stem, method, model]
-        cells += [f"{error['arithmetic_max_lsb']:.2f} / {error['method_max_lsb']:.2f}" for error in errors]
-        cells += [f"{row[100]['errors']['total_max_lsb']:.1f}", f"{times['cycles_per_pixel']:.3f}"]
-        cells += [f"{times['simulated_pixels_per_second'] / 1e6:.1f}"]
-        lines.append(f"| {' | '.join(cells)} |")
-    return "\n".join([*lines, ""])

@@ -4,10 +4,12 @@ import re
 import subprocess
 import sys
 import time
+from pathlib import Path
 
 import click
 import pytest
 
+import blysk.bench
 from blysk.bench import command
 from blysk.bench.command import run
 from blysk.sim.cli.main import main
@@ -139,3 +141,33 @@ def test_progress_of_short_work_says_nothing(capsys):
         bar.set_description_str("first")
         bar.update(2)
     assert capsys.readouterr() == ("", "")
+
+
+MODULES = """
+import contextlib, io, runpy, sys
+def run(module, *arguments):
+    sys.argv = [module, *arguments]
+    try:
+        runpy.run_module(module, run_name="__main__", alter_sys=True)
+    except SystemExit as stop:
+        return stop.code or 0
+with contextlib.redirect_stdout(io.StringIO()), contextlib.redirect_stderr(io.StringIO()) as errors:
+    found = {(run(module, "--help"), run(module, "--nonsense")) for module in sys.argv[1:]}
+print(found, [name for name in HEAVY if name in sys.modules])
+print(errors.getvalue().count("No such option"))
+"""
+
+
+def test_help_and_refused_options_of_modules_are_quick():
+    """Every module of this layer that is a command loads nothing heavy before its options are checked."""
+    (folder,) = blysk.bench.__path__
+    commands = [
+        "blysk.bench." + ".".join(path.relative_to(folder).with_suffix("").parts)
+        for path in sorted(Path(folder).rglob("*.py"))
+        if 'if __name__ == "__main__":' in path.read_text()
+    ]
+    assert len(commands) >= 7
+    heavy = ["amaranth", "blysk.golden.presets", "matplotlib", "scipy", "trimesh"]
+    code = MODULES.replace("HEAVY", repr(heavy))
+    done = subprocess.run([sys.executable, "-c", code, *commands], capture_output=True, text=True, check=True)
+    assert done.stdout == f"{{(0, 2)}} []\n{len(commands)}\n", done.stdout

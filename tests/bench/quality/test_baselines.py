@@ -7,17 +7,9 @@ import numpy as np
 import pytest
 
 from blysk.bench.accuracy import model_of
-from blysk.bench.quality import baselines
-from blysk.bench.quality.baselines import (
-    ENTRIES,
-    TOLERANCE,
-    UPDATE,
-    cycles_of,
-    differences,
-    main,
-    measure,
-    read,
-)
+from blysk.bench.quality import baselines, resources
+from blysk.bench.quality.baselines import TOLERANCE, UPDATE, differences, main, read
+from blysk.bench.quality.resources import ENTRIES, cycles_of, measure
 from blysk.bench.tools.blocks import ENTRIES as UNITS
 from blysk.bench.units.registry import RECORDS
 from blysk.golden.build import STYLES
@@ -48,7 +40,7 @@ def test_nothing_moved(name, monkeypatch):
         assert all(width <= 18 for width, _ in cost.multipliers)
         return cost
 
-    monkeypatch.setattr(baselines, "cost_of", narrow)
+    monkeypatch.setattr(resources, "cost_of", narrow)
     old = {name: BASELINES[name]} if name in BASELINES else {}
     moved = differences(old, {name: measure(name)}, TOLERANCE)
     assert not moved, f"{'; '.join(moved)}. If that is meant: {UPDATE}"
@@ -101,7 +93,7 @@ def test_cycles_are_those_of_the_pixels():
     """The simulation by hand, to the last pixel; at least a clock a pixel."""
     design = preset("linear", "cosquad")
     cycles = cycles_of(design)
-    scenes = baselines._scenes()
+    scenes = resources._scenes()
     assert set(cycles) == {f"{name}_cycles" for name in scenes}
     for name, scene in scenes.items():
         spans, constants = prepare(scene, design).spans, FrameConstants.of(scene)
@@ -117,7 +109,7 @@ def test_cycles_are_those_of_the_pixels():
 
 def test_frames_have_short_spans_and_long_ones():
     spans = {
-        name: prepare(scene, preset(model="cosquad")).spans for name, scene in baselines._scenes().items()
+        name: prepare(scene, preset(model="cosquad")).spans for name, scene in resources._scenes().items()
     }
     assert np.median(spans["teapot"].length) < 4
     assert spans["square"].length.max() >= 16
@@ -158,9 +150,9 @@ def small(monkeypatch, tmp_path):
     figures = {"one": {"cells": 1000}, "two": {"cells": 2000, "multipliers": 3}}
     path = tmp_path / "baselines.json"
     monkeypatch.setattr(baselines, "FILE", path)
-    monkeypatch.setattr(baselines, "ENTRIES", dict.fromkeys(figures))
+    monkeypatch.setattr(resources, "ENTRIES", dict.fromkeys(figures))
     monkeypatch.setattr(baselines, "local_executor", lambda jobs: nullcontext())
-    monkeypatch.setattr(baselines, "measure", lambda name: figures[name])
+    monkeypatch.setattr(resources, "measure", lambda name: figures[name])
     monkeypatch.setattr(baselines, "results_of", lambda tasks, *_: [task.run() for task in tasks])
     return figures, path
 

@@ -5,10 +5,11 @@ from dataclasses import replace
 
 import pytest
 
-from blysk.bench.quality import equivalence, mutants
+from blysk.bench.quality import equivalence, mutation_score
 from blysk.bench.quality.equivalence import Miter
-from blysk.bench.quality.mutants import LEAST, Score, main, scores, table, waived
+from blysk.bench.quality.mutants import COUNT, LEAST, SEED, main
 from blysk.bench.quality.mutation import Mutants, killed, mutate, vectors_of
+from blysk.bench.quality.mutation_score import Score, scores, table, waived
 from blysk.bench.units.registry import RECORDS
 from blysk.sim.frames.workers import local_executor
 
@@ -31,7 +32,7 @@ def test_score_leaves_the_equivalent_out():
 
 def test_waivers_are_of_a_signal_and_its_copies(monkeypatch):
     record = replace(RECORDS["diffuse"], waivers={"datapath.sum": "for a reason", "last_?": "for another"})
-    monkeypatch.setitem(mutants.RECORDS, "diffuse", record)
+    monkeypatch.setitem(mutation_score.RECORDS, "diffuse", record)
     for signal in ("unit.datapath.sum", "unit.datapath.sum_3", "unit.inner.datapath.sum", "unit.last_1"):
         assert waived("diffuse", f"stuck-at-0 -> {signal}")
     for signal in ("unit.datapath.summand", "unit.sum", "unit.last"):
@@ -44,7 +45,7 @@ def test_waivers_are_of_a_signal_and_its_copies(monkeypatch):
 @pytest.mark.parametrize(("survivors", "status"), [(10, 0), (11, 1)])
 def test_status_tells_whether_the_score_is_reached(monkeypatch, capsys, survivors, status):
     row = Score("diffuse", 200, (), tuple(f"inv -> unit.o{k}" for k in range(survivors)))
-    monkeypatch.setattr(mutants, "scores", lambda *_: [row])
+    monkeypatch.setattr(mutation_score, "scores", lambda *_: [row])
     assert main(["diffuse"]) == status
     assert capsys.readouterr().err.count("survived without a waiver: diffuse: inv -> unit.o") == survivors
 
@@ -53,7 +54,7 @@ def test_status_tells_whether_the_score_is_reached(monkeypatch, capsys, survivor
 def test_controls_that_a_memory_lacks_are_left_alone(tmp_path):
     """Its ports have neither clock nor reset before they are mapped. Yosys refuses other values there."""
     record = RECORDS["texel_memory"]
-    known = mutate(record.variants[record.default].unit(), 200, mutants.SEED, tmp_path)
+    known = mutate(record.variants[record.default].unit(), 200, SEED, tmp_path)
     assert not [mutant for mutant in known.values() if re.search(r"memrd\S* ([AS]RST|EN)\[", mutant)]
     assert [mutant for mutant in known.values() if "memrd" in mutant]
 
@@ -119,7 +120,7 @@ def test_faults_of_high_bits_of_counters_are_killed(tmp_path):
 def test_mutants_are_killed():
     """Of a small unit; ``make mutants`` takes all."""
     with local_executor(1) as executor:
-        (row,) = scores(["diffuse"], executor=executor)
+        (row,) = scores(["diffuse"], COUNT, SEED, executor)
     assert row.score >= LEAST
     assert not row.open
 

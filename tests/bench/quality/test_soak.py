@@ -5,13 +5,13 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from blysk.bench.quality.soak import (
+from blysk.bench.quality.soak import main
+from blysk.bench.quality.soak_runs import (
     _CLOCKS,
     DESIGNS,
     WIDEST,
     _beats_of_runs,
     _unit,
-    main,
     measure,
     measure_unit,
     random_constants,

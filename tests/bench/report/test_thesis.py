@@ -22,7 +22,7 @@ from blysk.bench.report.thesis import (
     square_errors,
 )
 from blysk.bench.report.thesis_ways import SPANS, WAYS, random_operands
-from blysk.bench.speed.renderer import Timing
+from blysk.bench.speed.renderer_times import Timing
 from blysk.bench.tools.blocks import entry_of
 from blysk.golden.reference.curves import interpolate
 from blysk.golden.reference.renderer import render

@@ -5,8 +5,9 @@ import dataclasses
 
 import pytest
 
-from blysk.bench.speed import engines
-from blysk.bench.speed.engines import LEAST_LENGTH, beats_of_teapot, main, measure
+from blysk.bench.speed import engine_rates
+from blysk.bench.speed.engine_rates import LEAST_LENGTH, beats_of_teapot, measure
+from blysk.bench.speed.engines import main
 from blysk.bench.speed.verilator import verilator_folder
 from blysk.golden.presets import preset
 from blysk.hdl.pipeline import ShadingPipelineUnit
@@ -27,13 +28,13 @@ class Same:
 @pytest.fixture
 def few(monkeypatch):
     """A pipeline that is soon compiled; runs are kept for `Same`."""
-    unit, simulate = ShadingPipelineUnit(preset("linear", None)), engines.simulate
+    unit, simulate = ShadingPipelineUnit(preset("linear", None)), engine_rates.simulate
 
     def kept(*arguments, **options):
         Same.last = simulate(*arguments, **options)
         return Same.last
 
-    monkeypatch.setattr(engines, "simulate", kept)
+    monkeypatch.setattr(engine_rates, "simulate", kept)
     beats, write = beats_of_teapot(unit, 2000, 1500)
     assert min(beats["length"]) >= LEAST_LENGTH
     return unit, {name: column[:60] for name, column in beats.items()}, write
@@ -42,20 +43,20 @@ def few(monkeypatch):
 @pytest.mark.ci
 @pytest.mark.long
 def test_what_differs_is_no_measure(few, monkeypatch):
-    monkeypatch.setattr(engines, "Verilated", lambda unit, folder: Same(unit, 0))
+    monkeypatch.setattr(engine_rates, "Verilated", lambda unit, folder: Same(unit, 0))
     rates = measure(*few, repeats=1)
     assert list(rates) == ["cxxrtl", "verilator", "pysim"]
     assert min(rates.values()) > 0
-    monkeypatch.setattr(engines, "Verilated", lambda unit, folder: Same(unit, 1))
+    monkeypatch.setattr(engine_rates, "Verilated", lambda unit, folder: Same(unit, 1))
     with pytest.raises(ValueError, match=r"^Verilator's model and the compiled engine differ$"):
         measure(*few, repeats=1)
-    simulate = engines.simulate
+    simulate = engine_rates.simulate
 
     def late(*arguments, engine, **options):
         run = simulate(*arguments, engine=engine, **options)
         return dataclasses.replace(run, cycles=run.cycles + (engine == "cxxrtl"))
 
-    monkeypatch.setattr(engines, "simulate", late)
+    monkeypatch.setattr(engine_rates, "simulate", late)
     with pytest.raises(ValueError, match=r"^the engines differ in cycles$"):
         measure(*few)
 
@@ -76,9 +77,9 @@ def test_measure(few):
 )
 def test_targets(monkeypatch, capsys, rates, missed):
     found = dict(zip(("cxxrtl", "verilator", "pysim"), rates, strict=True))
-    monkeypatch.setattr(engines, "beats_of_teapot", lambda unit, width, height: ({}, {}))
-    monkeypatch.setattr(engines, "measure", lambda unit, beats, write, repeats: found)
-    assert main() == (0 if missed is None else 1)
+    monkeypatch.setattr(engine_rates, "beats_of_teapot", lambda unit, width, height: ({}, {}))
+    monkeypatch.setattr(engine_rates, "measure", lambda unit, beats, write, repeats, step: found)
+    assert main([]) == (0 if missed is None else 1)
     lines = capsys.readouterr().out.splitlines()
     assert lines[2].split() == ["verilator", f"{rates[1]:,.0f}", f"{rates[0] / rates[1]:,.2f}x"]
     assert lines[-1] == ("every target met" if missed is None else f"missed: {missed}")
