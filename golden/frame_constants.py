@@ -57,7 +57,7 @@ TEXELS_ADDRESS, TEXEL_ADDRESS = 14, 15
 """Addresses that load texels: one takes an index, the other takes values, see `LoadedTextures.writes`."""
 
 FIELDS_OF_A_LIGHT = {"direction": (0, 3), "halfway": (3, 3), "diffuse": (6, 3), "specular": (9, 3)}
-"""First address and number of words of each field of a light. Add ``(light + 1) * LIGHT_STRIDE``."""
+"""First address and number of words for each field of a light. Add ``(light + 1) * LIGHT_STRIDE``."""
 
 MATERIAL_ADDRESS = 4
 """Address of the index of a material, in a pipeline with several. Later constants belong to this material."""

@@ -120,8 +120,8 @@ class SpanAttributes(NamedTuple):
         Raises
         ------
         ValueError
-            If a colour, a weight, a length or a level is out of range, the weights of a span have a larger
-            ratio than `LARGEST_RATIO`, or texture coordinates do not fit.
+            If a colour, a weight, a length or a level is out of range, or texture coordinates do not fit. If
+            the ratio of a span's weights is over `LARGEST_RATIO`.
         """
         length = checked_lengths(length)
         steps = np.maximum(length - 1, 1)

@@ -204,7 +204,7 @@ class Attributes:
         return Fixed(SQ(4, 23), whole) + product
 
     def errors(self, words: AttributeWords, of_words: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Bounds of the errors of colours and of texture coordinates, for attributes from -1 to 1.
+        """Bounds of the errors of colours and texture coordinates, for attributes from -1 to 1.
 
         Errors e of the words move ``U/w`` by at most ``2 e/w``. The bound counts 33/32 of this, because the
         product of a U that saturates is too small.

@@ -74,7 +74,7 @@ class HalfChord:
 
     @cached_property
     def roots(self) -> tuple[Fixed, Fixed]:
-        """Table of the square root: value at the start of each of 512 segments of [0, 1), and slope.
+        """Table of the square root for 512 segments of [0, 1): value at the start of a segment, and slope.
 
         Each line has the least maximum error. The first 128 words are 0. They are read only if ``w = 0``.
         """

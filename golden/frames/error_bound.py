@@ -1,4 +1,4 @@
-"""Bounds of the error of a frame and of its pixels, by the method and the transfer of a design."""
+"""Bounds of the errors of a frame and its pixels, from the method and the transfer of the design."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace

@@ -30,7 +30,7 @@ class LightErrors(NamedTuple):
     Parameters
     ----------
     diffuse, highlight : float64 arrays, shape (3,)
-        Bounds of the errors of the sums of diffuse and of specular terms.
+        Largest error of the sum of the diffuse terms, and of the sum of the specular terms.
     """
 
     diffuse: np.ndarray

@@ -16,7 +16,7 @@ SPAN_NORMAL = SQ(1, 26)
 """Number format of a component of N/W at a pixel."""
 
 SPAN_STEP = GradientSetup.FORMAT
-"""Number format of the step of a component of N/W from a pixel to the next."""
+"""Number format of an N/W component's step, from a pixel to the next."""
 
 SPAN_DEPTH = UQ(24, 9)
 """Number format of the depth at a pixel."""

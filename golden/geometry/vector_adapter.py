@@ -40,8 +40,9 @@ class VectorSpans(PlacedSpans):
 class VectorAdapter:
     """Words of `SpanVectors` from N/W at both ends of a span and its step: shifts and roundings alone.
 
-    The components of both ends and of the step are shifted left by the same number s of places: the number of
-    bits that repeat the sign in all components of the ends, `SpanHalver.shift`. Then each word x becomes ``x
+    The components of both ends and of the step are shifted left by the same number of places, s. This is
+    `SpanHalver.shift`, the number of bits that repeat the sign in all components of the ends. Then each word
+    x becomes ``x
     - 2^-14 x``, cut. This leaves a margin of 8 steps of 2^-17 to 1. No pixel may reach 1, and nothing
     saturates. The step is shifted left by e more places. e is the largest number up to 15 that leaves the
     step under 1. If ``flip`` is set, the start is negated. If exactly one of ``flip`` and ``turned`` is set,

@@ -110,7 +110,7 @@ class HighlightGate(Gate):
 
     @property
     def component_format(self) -> Format:
-        """Format of a component of the normals and of H."""
+        """Format of the components of normals and H."""
         return SQ(1, self.fraction_bits)
 
     @property

@@ -79,7 +79,7 @@ class Format:
         return 2.0**-self.fraction_bits
 
     def wrap(self, codes: np.ndarray) -> np.ndarray:
-        """Codes made of the low bits of integers of any size. An int64 sum may have overflowed."""
+        """Codes from the low bits of integers of any size. An int64 sum may have overflowed."""
         low = codes & ((1 << self.width) - 1)
         return low - ((low >> (self.width - 1)) << self.width) if self.signed else low
 

@@ -52,7 +52,7 @@ class Part:
 
 @dataclass(frozen=True)
 class MeshMemory:
-    """Contents of the memories of vertices and of triangles.
+    """Contents of the vertex memory and the triangle memory.
 
     Positions count from the middle of their mesh's box, in units in which the largest component is ONE.
     Positions and normals are rounded to ``SQ(1, 17)``. So the error of a position is at most 2^-18 of half

@@ -25,7 +25,7 @@ MAX_BYTES = 100_000
 _MAX_DOTS = 256
 """Largest number of dots in a line.
 
-The memory that `tomllib` takes grows with the square of the number of parts of a key.
+`tomllib` takes memory that grows with the square of the number of dots in a key.
 """
 
 

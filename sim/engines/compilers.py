@@ -131,7 +131,7 @@ def find_compilers() -> Iterator[Compiler]:
 
 
 def compiler_missing(failures: list[str]) -> CompilerMissing:
-    """The error that no compiler works. Its message has the ``failures``, or the tried compilers."""
+    """An error which says that no compiler works. It names the ``failures``, or the tried compilers."""
     chosen = os.environ.get("CXX", "").strip()
     if failures:
         reason = "; ".join(failures)

@@ -185,8 +185,8 @@ def simulate(
     beats : structured array or mapping
         Input beats, as `beats.pack` takes them.
     count : int or None
-        Expected number of output beats. The run ends ``settle`` cycles after these beats, all writes and all
-        input beats are transferred. ``None`` takes any number, until all input is taken and
+        Expected number of output beats. The run ends ``settle`` cycles after the last transfer of these
+        beats, all writes and all input beats. ``None`` takes any number, until all input is taken and
         ``idle_timeout`` cycles have passed without a transfer.
     constants : scalar of the constants' type, or mapping of names to codes
         Values for the whole run. Needed if the component has ``constants``.

@@ -20,10 +20,11 @@ _WORD = 32
 class ToggleCounter(Component):
     """A component that counts the toggles of its register bits since reset. Each submodule has a counter.
 
-    A toggle is one bit that differs from its value in the cycle before. The bits of registers and of the
-    registered read data of memories are counted. Bits stored in a memory, and bits of combinational signals,
-    are left out. A register that changes at one clock edge is in the count after the next edge. Counters have
-    48 bits, because 1000 registers of 18 bits make fewer than 2^48 toggles in 10^10 cycles.
+    A toggle is one bit that differs from its value in the cycle before. The counters count the bits of
+    registers, and the bits of memories' registered read data. Bits stored in a memory, and bits of
+    combinational signals, are left out. A register that changes at one clock edge is in the count after the
+    next edge. Counters have 48 bits, because 1000 registers of 18 bits make fewer than 2^48 toggles in 10^10
+    cycles.
 
     Parameters
     ----------

@@ -57,7 +57,7 @@ class OneClock(wiring.Component):
         self.top, self.rate = top, Fraction(rate)
         if not 0 < self.rate <= 1:
             raise ValueError(
-                "the rate of the drawing clock must be over 0, and at most that of the serial clock"
+                "the rate of the drawing clock must be over 0, and at most the rate of the serial clock"
             )
         members = top.signature.members
         buttons = members["buttons"].shape if "buttons" in members else 1

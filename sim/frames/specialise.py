@@ -89,7 +89,8 @@ def specialise(
     - the upper bits of coordinates and lengths.
 
     The words of the arithmetic keep their widths, so that every pixel stays the same. Vectors of spans depend
-    on all lights and on the highlights. A method with vectors of spans therefore keeps both.
+    on all lights and on the highlights. A method with vectors of spans therefore keeps all lights and the
+    highlights.
 
     If ``exact`` is false and all spans are short, the differences of ``chord-local`` also get fewer bits. The
     error bound stays, but pixels may change.

@@ -30,7 +30,7 @@ class FileMaterial:
     name : str
         Its name. Empty for faces without a material in the file.
     diffuse, specular : three floats or None
-        Colours, each channel 0 to 1: k_d and k_s without conversion.
+        Colours, each channel 0 to 1. They become k_d and k_s without conversion.
     exponent : int or None
         Exponent of the highlight, 1 to 1000.
     roughness : float or None

@@ -27,9 +27,9 @@ _COSINE_SLACK = 1e-6
 def face_directions(vertices: np.ndarray, faces: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Unit face normals, with flags. A face without area takes the normal of a neighbour.
 
-    The neighbour across its longest side goes first. So a face between corners of a straight side takes the
-    normal of the polygon at this side. A face with two corners at the same position, or without a neighbour,
-    has no normal.
+    The neighbour across its longest side is tried first. So a face between corners of a straight side takes
+    the normal of the polygon at this side. A face with two corners at the same position, or without a
+    neighbour, has no normal.
 
     Parameters
     ----------
