@@ -46,6 +46,9 @@ from blysk.sim.errors import InputError
 
 __all__ = ["Compiled", "runtime_folder", "sources_of"]
 
+_REWRITING = ("parts", "guards", "words", "expressions")
+"""Modules that rewrite a C++ class. Their text belongs to the key of a compiled model."""
+
 # A component whose model is in the cache is not elaborated. Amaranth would warn of this when the component is
 # deleted.
 warnings.filterwarnings("ignore", message=r"<blysk\.", category=UnusedElaboratable)
@@ -256,7 +259,7 @@ def _key(netlist: str, driver: str, compiler: Compiler) -> str:
     parts = (
         netlist,
         _SCRIPT,
-        *(_source(name) for name in ("parts.py", "guards.py", "words.py")),
+        *(_source(f"{name}.py") for name in _REWRITING),
         driver,
         compiler.identity,
         repr(compiler.compile[1:] + compiler.link[1:]),
@@ -328,7 +331,7 @@ class Compiled:
 
     The library comes from the cache, or is built. A built library is compared with pysim on its first run,
     and only then put into the cache. The name of an entry has two hashes: the key, and the hash of the
-    entry's content. The key is made of netlist, Yosys script, `parts`, `guards`, `words`, driver, compiler,
+    entry's content. The key is made of netlist, Yosys script, `_REWRITING`, driver, compiler,
     flags, platform and version of Yosys. An entry is written under a temporary name and then renamed, so no
     process reads half of it. If the cache has no room, there is a warning, and the next process builds again.
     For an origin the cache also has a file with the netlist's hash. The file's name is the hash of component

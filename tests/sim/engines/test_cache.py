@@ -254,3 +254,15 @@ def test_code_version_tells_libraries_apart(monkeypatch):
     assert known == cache_module.code_version.__wrapped__("numpy", "not-installed")
     monkeypatch.setattr(cache_module, "version_of", lambda package: "another")
     assert known != cache_module.code_version.__wrapped__("numpy")
+
+
+def test_text_of_every_rewriting_module_is_in_the_key():
+    """A model that another text of them would write anew is not taken from the cache."""
+    seen, imported = [], re.compile(r"^from blysk\.sim\.engines\.(\w+) import", re.MULTILINE)
+    waiting = ["parts", "guards", "words"]
+    while waiting:
+        name = waiting.pop()
+        if name not in seen:
+            seen.append(name)
+            waiting += imported.findall(cxxrtl._source(f"{name}.py"))
+    assert sorted(seen) == sorted(cxxrtl._REWRITING)
