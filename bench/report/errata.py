@@ -52,7 +52,7 @@ FACTOR_PUBLISHED = (0.707, -0.341, 0.193, -0.059)
 _ROOT_DOMAIN = (math.sqrt(2), 2.0)
 
 Pair = tuple[float, float]
-"""A quantity by the document's statement, and as measured."""
+"""A quantity by the document's statement, and the same quantity as measured."""
 
 
 def _by_cosine(r: np.ndarray) -> np.ndarray:
@@ -114,7 +114,8 @@ def factor_quadratics() -> dict[str, tuple[float, float]]:
     """Largest absolute and relative error of three quadratics for the factor of the middle normal.
 
     ``"nodes"`` goes through the values at Chebyshev's nodes. ``"relative"`` has the least largest relative
-    error. ``"within"`` has the least among quadratics with an absolute error of 0.002 at most.
+    error. ``"within"`` has the least largest relative error among quadratics with an absolute error of at
+    most 0.002.
     """
     x = (1 - np.cos(np.linspace(0, np.pi, 4001))) / 2
     exact = _by_cosine(x)
@@ -145,7 +146,7 @@ def second_lobe() -> Pair:
 
 
 def shortcut(degrees: float) -> Pair:
-    """Ratio of ``1 - cos d`` by the published shortcut to the exact value, for a span's angle; and 1."""
+    """``1 - cos d`` by the published shortcut, divided by the exact value, for a span's angle; and 1."""
     angle, steps = math.radians(degrees), 1000
     exact = 2 * math.sin(angle / steps / 2) ** 2
     return float((1 - shortcut_cosine(angle, steps)) / exact), 1.0
@@ -170,7 +171,7 @@ def recurrence(pixels: int, degrees: float, bits: int) -> Pair:
 def worked_example() -> float:
     """[B] 5 at ``N = V = (0, 0, 1)``, ``L = (1, 1, 1)/sqrt 3``, n = 10, in one channel."""
     axis = np.array([0.0, 0, 1])
-    # I_d = 0.8 and I_s = 1 need two lights: the first has no highlight, the second only a highlight.
+    # I_d = 0.8 and I_s = 1 need two lights. The first has no highlight, and the second only a highlight.
     dull = Material((0.1,) * 3, (0.7,) * 3, (0,) * 3, 10)
     glossy = Material((0,) * 3, (0,) * 3, (0.5,) * 3, 10)
     total = intensity(
@@ -186,7 +187,7 @@ def flat_picture() -> Pair:
     reference[0, 0] = 200
     reference[0, 1] = 0
     image = reference + 1
-    # The mean is 100. All values but two equal the mean.
+    # The mean is 100. All values except two are equal to the mean.
     return mnse_published(image, reference)[1], float(np.isfinite(nmse(image, reference)))
 
 
@@ -194,7 +195,7 @@ def inverted_test() -> Pair:
     """Share of triangles of a teapot that take Gouraud shading: by the test as published, and inverted."""
     scene = scene_for(teapot(1_000), 50, 160, 120)
     every = len(scene.mesh.faces)
-    # Without the tests of highlight and diffuse term, because the inversion does not change them.
+    # The tests of highlight and diffuse term are off, because the inversion does not change them.
     close = int(gouraud_triangles(scene, Thresholds(highlight=math.inf, diffuse=math.inf)).sum())
     return (every - close) / every, close / every
 
@@ -213,7 +214,7 @@ def extrapolated_end() -> Pair:
 
 
 def scaled_in_place() -> Pair:
-    """Error of the last normal of the same span: with ``dN`` itself times i/5 at each pixel i, and a copy."""
+    """Error of the last normal of the same span: ``dN`` itself times i/5 at pixel i, and a scaled copy."""
     angle, pixels = math.radians(10), 6
     left, right = np.array([0.0, 0, 1]), np.array([math.sin(angle), 0, math.cos(angle)])
     shares = np.arange(pixels) / (pixels - 1)

@@ -2,8 +2,8 @@
 
 ``blysk explore`` draws a scene with every design of a sweep over method, model, lights, polynomial degree,
 word length, operand and style. It lists the cheapest designs under a given error. The bit-accurate model
-computes the frames. It equals the simulation to the bit. Costs are counted in the netlist. Results are kept,
-so that every design is measured once, and a stopped run can continue.
+computes the frames, and is equal to the simulation to the bit. Costs are counted in the netlist. The cache
+keeps results. So every design is measured once, and a stopped run can continue.
 """
 
 from collections.abc import Mapping, Sequence
@@ -62,8 +62,8 @@ def tasks(quick: bool) -> list[Task]:
     Parameters
     ----------
     quick : bool
-        Whether to measure five methods on a teapot of 992 triangles at 160x120. Else the default `Sweep` is
-        measured on a teapot of 10,712 triangles at 320x240.
+        Whether the report is quick. A quick report measures five methods on a teapot of 992 triangles at
+        160x120. A full report measures the default `Sweep` on a teapot of 10,712 triangles at 320x240.
     """
     if quick:
         one = {"operands": (None,), "degrees": (3,), "fraction_bits": (46,), "styles": ("throughput",)}

@@ -1,4 +1,4 @@
-"""Frames of methods and models, baselines, variants as published: errors, run times, pictures."""
+"""Frames of methods, baselines and variants as published: errors, run times and pictures."""
 
 import base64
 import hashlib
@@ -105,7 +105,7 @@ TIMES = [
         ("golden_ns_per_pixel", "method and model in float64 NumPy", "ns a pixel", "less"),
     )
 ]
-"""Measures of run time and cost, in the same form."""
+"""Measures of run time and cost, in the form of `ERRORS`."""
 
 _REPEATS = 3
 
@@ -113,7 +113,7 @@ _SIDE = 280
 """Largest width of the embedded pictures."""
 
 STEPS = (0.5, 1.0, 2.0, 4.0, 8.0, 16.0, 32.0, 64.0, 128.0, 255.0)
-"""Largest error, in LSB, of each colour of an error map. The first is correct rounding."""
+"""Largest error, in LSB, of each colour of an error map. The first is the error of correct rounding."""
 
 
 # Measurements.
@@ -146,41 +146,47 @@ def frames(
 ) -> list[dict[str, Any]]:
     """Frames of a design: their errors, cycles and pictures.
 
-    Frames have codes of linear light, and so have their errors. Verdicts and perceived differences are of the
-    frames encoded as sRGB. Each error is between two images, over the pixels that show the surface:
+    Frames have codes of linear light, and errors are differences of these codes. Verdicts and perceived
+    differences are of the frames encoded as sRGB. Each error is between two images, over the pixels that show
+    the surface:
 
     - ``model``: Phong shading with the design's model, against Phong shading with Blinn's model, both in
       float64. Phong shading interpolates normals over the triangle, and normalises them at every pixel, as on
       a GPU. The error does not depend on the arithmetic. A model of R·V approximates no other model, so its
       error is 0;
-    - ``arithmetic``: the frame against the same method and model in float64. Coefficients as published count
-      as arithmetic;
+    - ``arithmetic``: the frame against the same method and model in float64. Errors from coefficients as
+      published count as arithmetic error;
     - ``method``: the frame against Phong shading with the same model;
-    - ``total``: the frame against the exact frame, Phong shading with Blinn's model, or with the design's own
-      model of R·V.
+    - ``total``: the frame against the exact frame. This is Phong shading with Blinn's model. For a model of
+      R·V it is Phong shading with the design's own model.
 
     Parameters
     ----------
     method, model : str
         Method and model of a `ShadingPipeline`.
     view : dict
-        ``source`` and ``triangles`` of the mesh (see `load_mesh`; ``None`` for a file), ``digest``
-        of its arrays, part of the result's key in the cache, ``width`` and ``height`` of the picture.
+        ``source`` and ``triangles`` of the mesh (see `load_mesh`; ``None`` for a file), and ``width`` and
+        ``height`` of the picture. ``digest`` is a hash of the arrays of the mesh. It is a part of the key of
+        the result in the cache.
     exponents : sequence of int
         Exponents, with a frame for each.
     simulated : bool
-        Whether the frames are simulated. Else the bit-accurate model computes them, equal to the bit.
+        Whether the frames are simulated. Else the bit-accurate model computes the same frames.
     operand : str, optional
         Operand of the specular unit, if it is not the method's operand.
 
     Returns
     -------
     list of dict
-        For each exponent ``settings``, ``errors`` (keys of `ERRORS`; no PSNR of equal images), ``verdicts``
-        (whether both images look identical, by kind of error), ``border`` (see `border_mask`: its
-        ``pixels`` and ``lsb``, their largest total error), ``pictures`` (see `section`), shaded
-        ``pixels``, ``shown`` pixels, ``spans``, ``out_of_range_spans``, ``cycles`` (``None`` if not
-        simulated) and ``modelled_cycles``, by `frame_cycles`.
+        For each exponent:
+
+        - ``settings``;
+        - ``errors``, with the keys of `ERRORS`. Equal images have no PSNR;
+        - ``verdicts``: whether both images look identical, by kind of error;
+        - ``border``: ``pixels`` of `border_mask`, and ``lsb``, the largest total error of these pixels;
+        - ``pictures``, see `section`;
+        - ``pixels``: shaded pixels, ``shown``: shown pixels, ``spans`` and ``out_of_range_spans``;
+        - ``cycles``: ``None`` if not simulated, and ``modelled_cycles``: by `frame_cycles`.
     """
     design = preset(method, model, operand=operand)
     simulator = FrameSimulator(design, "cxxrtl") if simulated else None
@@ -208,14 +214,14 @@ def frames(
 def software_frames(shading: str, view: Mapping[str, Any], exponents: Sequence[int]) -> list[dict[str, Any]]:
     """Frames of the golden renderer with Blinn's model, rounded to 8 bits: errors and pictures.
 
-    The errors are as for `frames`. The model error is 0. The arithmetic error is the rounding of the frame.
+    The errors are as in `frames`. The model error is 0. The arithmetic error is the rounding of the frame.
 
     Parameters
     ----------
     shading : str
         One of `SHADINGS`.
     view, exponents
-        As for `frames`.
+        As in `frames`.
 
     Returns
     -------
@@ -321,14 +327,17 @@ def speeds(
     Parameters
     ----------
     method, model, view, exponents, simulated, operand
-        As for `frames`.
+        As in `frames`.
 
     Returns
     -------
     list of dict
-        For each exponent ``simulated_pixels_per_second``, output pixels of the simulated pipeline, with
-        hidden ones, a second of simulation (``None`` if not simulated), and ``golden_ns_per_pixel``,
-        nanoseconds a shown pixel to shade the same spans by the same method and model in float64 NumPy.
+        For each exponent:
+
+        - ``simulated_pixels_per_second``: output pixels of the simulated pipeline in a second of simulation,
+          hidden pixels among them. ``None`` if not simulated;
+        - ``golden_ns_per_pixel``: nanoseconds a shown pixel to shade the same spans by the same method and
+          model in float64 NumPy.
     """
     design = preset(method, model, operand=operand)
     simulator = FrameSimulator(design, "cxxrtl") if simulated else None
@@ -352,7 +361,7 @@ def speeds(
 def software_speeds(
     shading: str, view: Mapping[str, Any], exponents: Sequence[int]
 ) -> list[dict[str, float | None]]:
-    """Run times of `software_frames`, as from `speeds`."""
+    """Run times of `software_frames`, in the form of `speeds`."""
     results = []
     for scene in scenes_of(view, exponents):
         raster = rasterise(scene)
@@ -393,7 +402,7 @@ def _pictures(image: np.ndarray, references: Mapping[str, np.ndarray], mask: np.
     rows, columns = (np.flatnonzero(mask.any(axis=axis)) for axis in (1, 0))
     shown = slice(rows[0], rows[-1] + 1), slice(columns[0], columns[-1] + 1)
     factor = -(-(columns[-1] + 1 - columns[0]) // _SIDE)
-    # Grey, so that one channel is all: `scene_for` has white light on a grey surface.
+    # `scene_for` has white light on a grey surface, so all channels are equal.
     pictures = {"frame": _png(Image.fromarray(image[shown]).convert("L").reduce(factor))}
     inside = _largest(mask[shown].astype(np.float64), factor) > 0
     for name, reference in references.items():
@@ -406,7 +415,7 @@ def _pictures(image: np.ndarray, references: Mapping[str, np.ndarray], mask: np.
 
 
 def _largest(values: np.ndarray, factor: int) -> np.ndarray:
-    """Largest value of each square of pixels, so that an error stays visible in a smaller picture."""
+    """Largest value of each square of pixels. So an error stays visible in a smaller picture."""
     height, width = (-(-side // factor) for side in values.shape)
     padded = np.zeros((height * factor, width * factor))
     padded[: values.shape[0], : values.shape[1]] = values

@@ -25,16 +25,18 @@ def summaries(
     points : sequence of dict
         Points of the report.
     spread : mapping
-        Results of `front_scenes.measure` by method, model and perhaps operand.
+        Results of `front_scenes.measure`, by method, model and the operand if it is not the method's own.
 
     Returns
     -------
     list of dict
-        ``label``, ``method``, ``group``, ``samples`` (their number); ``is_prepared``, whether spans bring dot
-        products; ``is_mirror``, whether the model takes R·V; ``method_error`` and ``total_error``, each
-        largest and smallest over the scenes; ``cycles``, smallest, median and largest cycles a pixel;
-        ``ns``, the same in nanoseconds over scenes and seeds, or ``None``; ``multipliers``, ``luts``,
-        ``fmax_mhz``, ``parts``, spans after cutting over spans before.
+        - ``label``, ``method`` and ``group``; ``samples``: number of scenes;
+        - ``is_prepared``: whether spans bring dot products; ``is_mirror``: whether the model takes R·V;
+        - ``method_error`` and ``total_error``: smallest and largest error over the scenes;
+        - ``cycles``: smallest, median and largest cycles a pixel;
+        - ``ns``: smallest, median and largest nanoseconds a pixel over scenes and seeds, or ``None``;
+        - ``multipliers``, ``luts`` and ``fmax_mhz``;
+        - ``parts``: number of spans after cutting, divided by the number before.
     """
     found: dict[str, dict[str, Any]] = {}
     for point in points:
@@ -90,7 +92,7 @@ _LEAST_LSB = 1e-2
 
 
 def conclusion(found: Sequence[Mapping[str, Any]]) -> Conclusion | None:
-    """Sentences on the front of the largest total error over all scenes against cycles a pixel.
+    """Sentences about the front of two measures: largest total error over all scenes, and cycles a pixel.
 
     Parameters
     ----------
@@ -163,16 +165,17 @@ def _front(found: Sequence[Mapping[str, Any]], kind: str, time: str = "cycles") 
     Designs that get their dot products as input are left out. Designs of R·V are left out, too, because they
     draw another picture.
 
-    A design beats another if it is no worse in error (by `_ALIKE_LSB`) and time (by `_ALIKE_TIMES`). It must
-    also be better by more than this in one of them, or smaller. It is smaller if it has fewer multipliers, or
-    as many and fewer look-up tables. `time` is a key of `summaries`, ``cycles`` or ``ns``.
+    A design beats another design if two conditions hold. First, it is no worse in error and time. Differences
+    up to `_ALIKE_LSB` and ratios up to `_ALIKE_TIMES` count as equal. Second, it is better in error or time,
+    or it is smaller. A smaller design has fewer multipliers, or equally many and fewer look-up tables.
+    ``time`` is ``cycles`` or ``ns``, a key of `summaries`.
     """
     found = [of for of in found if _is_compared(of)]
     if not found:
         return []
     error, times = np.array([(of[kind][1], of[time][1]) for of in found]).T
     multipliers = np.array([of["multipliers"] or np.inf for of in found])
-    # If a number of tables is not known, no comparison with it holds.
+    # NaN stands for an unknown number of tables. No comparison with NaN holds.
     luts = np.array([of["luts"] or np.nan for of in found])
     # [i, j]: whether j is better than i.
     less_error = error < error[:, np.newaxis] - _ALIKE_LSB
@@ -199,7 +202,10 @@ def _costs(of: Mapping[str, Any]) -> str:
 
 
 def _drawing(found: Sequence[Mapping[str, Any]], best: Mapping[str, Any]) -> Drawing:
-    """Drawing of both errors against nanoseconds, if most designs and the best are placed, else cycles."""
+    """Drawing of both errors against nanoseconds a pixel, or against cycles a pixel.
+
+    Nanoseconds need clock rates of most designs and of the best design.
+    """
     # A design with one scene is not comparable with designs of several scenes.
     several = [of for of in found if of["samples"] > 1]
     found = several if len(several) > 2 else found
@@ -305,7 +311,7 @@ def _short(of: Mapping[str, Any]) -> str:
 
 
 def _named(found: Sequence[Mapping[str, Any]], on: Container[str], kind: str) -> list[Mapping[str, Any]]:
-    """Designs with a label, most important first: the front, then each method's best and worst design."""
+    """Designs that get a label: first the front, then the best and the worst design of each method."""
     chosen = sorted((of for of in found if of["label"] in on), key=lambda of: of[kind][1])
     for method in dict.fromkeys(of["method"] for of in found):
         own = sorted((of for of in found if of["method"] == method), key=lambda of: of[kind][1])

@@ -118,9 +118,9 @@ def _specialised(name: str, size: Sequence[int]) -> tuple[Scene, Specialisation]
 
 
 def measure(name: str, size: Sequence[int]) -> dict[str, Any]:
-    """Savings of a scene's reductions, each alone and all together, and its frame beside the full frame.
+    """Savings of a scene's reductions, each alone and all together, and a comparison of both frames.
 
-    Both frames are by the bit-accurate models.
+    The bit-accurate models compute the frames of the full and of the specialised pipeline.
 
     Parameters
     ----------
@@ -158,7 +158,7 @@ def simulate_both(name: str, size: Sequence[int]) -> dict[str, int]:
     Parameters
     ----------
     name, size
-        As for `measure`.
+        As in `measure`.
     """
     scene, found = _specialised(name, size)
     full = FrameSimulator(found.full, "cxxrtl").render(scene)
@@ -179,7 +179,7 @@ def section(tasks: Sequence[Task], results: Sequence[Any]) -> Section:
     """The section: reductions of each scene, their savings, and whether its frame stays the same."""
     found: dict[str, dict[str, Any]] = {}
     for task, result in zip(tasks, results, strict=True):
-        # The larger count of different pixels, by the models or by simulation.
+        # Models and simulation both count different pixels. The larger number is kept.
         of = found.setdefault(task.settings["name"], {"cycles": None, "full_cycles": None})
         different = of.get("different_pixels", 0)
         of |= result
@@ -202,7 +202,7 @@ def section(tasks: Sequence[Task], results: Sequence[Any]) -> Section:
 
 
 def _shares_alone(found: dict[str, dict]) -> dict[str, list[tuple[str, dict[str, float]]]]:
-    """For each kind of reduction the scenes, and the share of each resource that it alone saves."""
+    """Scenes of each kind of reduction, and the share of each resource that this reduction alone saves."""
     shares: dict[str, list[tuple[str, dict[str, float]]]] = {}
     for name, of in found.items():
         for reason, saves in zip(of["reasons"], of["alone"], strict=True):
@@ -292,7 +292,7 @@ def _alone(found: dict[str, dict]) -> Table:
 
 
 def _left(figures: dict, resource: str) -> float:
-    """Remaining share of a resource. 1 if the full pipeline has none of it."""
+    """Remaining share of a resource. The share is 1 if the full pipeline does not have the resource."""
     full = figures["full"][resource]
     return figures["specialised"][resource] / full if full else 1.0
 

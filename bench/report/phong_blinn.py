@@ -45,7 +45,7 @@ __all__ = [
 ]
 
 PIXELS = 1 << 14
-"""Pixels that the ways in software compute at once. Their arrays stay in a processor's cache."""
+"""Pixels that the ways in software compute at a time. Their arrays stay in a processor's cache."""
 
 _EXPONENT = 50
 
@@ -104,14 +104,14 @@ def operations(way: str, local: bool) -> dict[str, float]:
     way : str
         One of `WAYS`.
     local : bool
-        Whether every pixel has its own L and V. Else L, V, L·V and H are computed once a frame, and hardly
-        count.
+        Whether every pixel has its own L and V. Else L, V, L·V and H are computed once a frame, and nearly
+        do not count.
 
     Returns
     -------
     dict
-        Operations of a pixel by kind (see `Counted`), and ``all`` of them. ``fewer`` is the saved share of
-        the operations of the first of `WAYS`.
+        Operations of a pixel by kind (see `Counted`), and their sum ``all``. ``fewer`` is the share of
+        operations that the way saves, compared with the first of `WAYS`.
     """
     counts: dict[str, Counter[str]] = {}
     for name in (next(iter(WAYS)), way):
@@ -123,14 +123,14 @@ def operations(way: str, local: bool) -> dict[str, float]:
 
 
 def shading_times(local: bool, repeats: int) -> dict[str, float]:
-    """Share of the time of Phong's way with the vector R that each way saves on the same pixels, in one run.
+    """Share of time that each way saves on the same pixels in one run, compared with Phong's way by R.
 
     Parameters
     ----------
     local : bool
-        As for `operations`.
+        As in `operations`.
     repeats : int
-        Runs of each, in turn; the fastest counts.
+        Runs of each way, in turn. The fastest run counts.
     """
     operands = vectors(local)
     times = fastest([lambda way=way: way(*operands) for way in WAYS.values()], repeats)
@@ -147,14 +147,14 @@ def frame_times(triangles: int, width: int, height: int, repeats: int) -> dict[s
     width, height : int
         Size of the picture.
     repeats : int
-        Runs of each, in turn; the fastest counts.
+        Runs of each model, in turn. The fastest run counts.
 
     Returns
     -------
     dict
-        ``phong`` and ``blinn``: nanoseconds of a pixel that shows the teapot, geometry included; ``frame``
-        and ``shading``: share of the time that Blinn's model saves, of the frame and of its shading;
-        ``geometry``: share of geometry in Blinn's frame.
+        - ``phong`` and ``blinn``: nanoseconds of a pixel that shows the teapot, geometry included;
+        - ``frame`` and ``shading``: share of time that Blinn's model saves, of the frame and of its shading;
+        - ``geometry``: share of geometry in the time of Blinn's frame.
     """
     scene = scene_for(teapot(triangles), _EXPONENT, width, height)
     raster = rasterise(scene)
@@ -191,15 +191,14 @@ _DIRECTIONS = {_ALONG: (1, 0), _ACROSS: (0, 1)}
 
 
 def half_angle(way: Sequence[float], degrees: float, exponent: float) -> float:
-    """Angle in radians of a normal from H, at which ``(R·V)^n`` is half of its peak; NaN if there is none.
+    """Angle in radians of a normal from H, at which ``(R·V)^n`` is half of its peak. NaN without this angle.
 
     The angle is found from R·V itself, ``R = 2 (N·L) N - L``.
 
     Parameters
     ----------
     way : two floats
-        Direction of the normal from H, of length 1: its parts along the plane of L and V, and across the
-        plane.
+        Unit vector from H to the normal: its parts along the plane of L and V, and across the plane.
     degrees : float
         Half of the angle from L to V, a.
     exponent : float
@@ -217,14 +216,14 @@ def half_angle(way: Sequence[float], degrees: float, exponent: float) -> float:
 
 
 def exponent_of_width(way: str, degrees: float, exponent: float) -> float:
-    """Exponent over n of Blinn's highlight that has its half at the same normal as ``(R·V)^n``.
+    """Exponent, divided by n, of Blinn's highlight that is half of its peak where ``(R·V)^n`` is, too.
 
     Parameters
     ----------
     way : {"along", "across"}
         Direction in which the normal turns: along the plane of L and V, or across the plane.
     degrees, exponent
-        As for `half_angle`.
+        As in `half_angle`.
     """
     gamma = half_angle(_DIRECTIONS[way], degrees, exponent)
     return math.log(0.5) / math.log(math.cos(gamma)) / exponent
@@ -252,14 +251,14 @@ def picture(model: str, exponent: int, side: int) -> dict[str, Any]:
     model : str
         ``"blinn"`` or ``"phong"``.
     exponent : int
-        Its exponent.
+        Exponent of the model.
     side : int
         Width and height.
 
     Returns
     -------
     dict
-        ``png``, in base 64, the part with the highlight; ``lsb``, the largest error of the picture off the
+        ``png``: the part with the highlight, in base 64. ``lsb``: largest error of the picture, without the
         border of the light.
     """
     scene = scene_for(sphere(48), exponent, side, side)
@@ -353,7 +352,7 @@ def _frames(quick: bool) -> list[Claim]:
 
 
 def claims(quick: bool) -> list[Claim]:
-    """All claims. Frames have up to 10,000 triangles at 320x240 if quick, else a million at 1920x1080."""
+    """Claims. Frames have up to 10,000 triangles at 320x240 if quick, else up to a million at 1920x1080."""
     return [*_shapes(quick), *_counts(quick), *_frames(quick)]
 
 

@@ -52,7 +52,7 @@ GROUPS = {
     "published": "variants as published",
     "software": "golden renderer, only software",
 }
-"""Groups of points, with their titles."""
+"""Titles of the groups of points, by key."""
 
 DESIGNS = [(method, model_of(method)) for method in METHODS]
 
@@ -66,15 +66,16 @@ DESIGNS += [(method, "cosquad") for method in PUBLISHED]
 """Method and model of the hardware's points, with the method's own operand of the specular unit."""
 
 BEST = [method for method, interpolator in METHODS.items() if interpolator.operand == "cosine"]
-"""Methods whose own operand is N·H, as in their documents. They are more exact with 1 - N·H. They have points
-with both operands, so that each method is also compared in its best form. Variants as published are in
-`PUBLISHED`.
+"""Methods whose own operand is N·H, as in their documents.
+
+These methods are more exact with 1 - N·H. They have points with both operands, so each method is also
+compared in its best form. Variants as published are in `PUBLISHED`.
 """
 
 _BEST_OPERAND = {"operand": "one_minus_cosine"}
 
 _BEST_MODEL = "blinn"
-"""An exact lobe table. Each method in its best form also has points with this model."""
+"""A model with an exact table. Each method in its best form also has points with this model."""
 
 QUICK_SIMULATED = [(method, model_of(method)) for method in (*METHODS, *PUBLISHED)]
 QUICK_SIMULATED += [("quotient", "phong")]
@@ -94,11 +95,12 @@ def tasks(quick: bool, meshes: Sequence[str] = ()) -> list[Task]:
     Parameters
     ----------
     quick : bool
-        If quick, a teapot of 992 triangles at 160x120 and exponent 100. The designs of `QUICK_SIMULATED` are
-        simulated, and the bit-accurate model computes the other designs. Clock rates are the committed rates
-        (`placed`). If not quick, a teapot of 10,712 triangles at 640x480 and all `EXPONENTS`. Every design is
-        simulated. If the tools are installed, every design is placed and routed. Without a C++ compiler
-        nothing is simulated. Further scenes: see `front_scenes`.
+        Whether the report is quick. A quick report draws a teapot of 992 triangles at 160x120 with exponent
+        100. It simulates the designs of `QUICK_SIMULATED`, and the bit-accurate model computes the other
+        designs. Clock rates are the committed rates (`placed`). A full report draws a teapot of 10,712
+        triangles at 640x480 with all `EXPONENTS`. It simulates every design. If the tools are installed, it
+        places and routes every design. Without a C++ compiler nothing is simulated. `front_scenes` has the
+        further scenes.
     meshes : sequence of str
         Files of further meshes.
 
@@ -153,7 +155,7 @@ def _group(method: str) -> str:
 
 
 def _command(settings: Mapping[str, Any]) -> str:
-    """Command line that reproduces a point: `blysk render`, or Python for the golden renderer's shadings."""
+    """Command line that reproduces a point: `blysk render`, or Python for shadings of the golden renderer."""
     if settings["engine"] == "float64":
         view = {name: settings[name] for name in ("source", "triangles", "width", "height")}
         call = f"software_frames({settings['method']!r}, {view}, [{settings['exponent']}])"
@@ -176,7 +178,7 @@ def _command(settings: Mapping[str, Any]) -> str:
 
 
 def _points(tasks: Sequence[Task], results: Sequence[Any]) -> list[dict[str, Any]]:
-    """The points, by mesh in the order of the tasks, exponent and design."""
+    """The points, sorted by mesh in the order of the tasks, then by exponent, then by design."""
     of_design = _of_designs(tasks, results)
     of_frame: dict[tuple, dict] = {}
     for task, result in zip(tasks, results, strict=True):
@@ -241,7 +243,7 @@ _HARDWARE = (
 
 
 def _of_designs(tasks: Sequence[Task], results: Sequence[Any]) -> dict[tuple, dict[str, Any]]:
-    """Hardware of designs by the netlist, and by place and route, measured now or committed."""
+    """Resources of designs, from the netlist and from place and route, measured now or committed."""
     found: dict[tuple, dict[str, Any]] = {}
     for design, entry in placed(DEVICE).items():
         rates = {"fmax_mhz": entry["fmax_median_mhz"], "seeds_mhz": entry["fmax_mhz"]}
@@ -258,7 +260,7 @@ def _of_designs(tasks: Sequence[Task], results: Sequence[Any]) -> dict[tuple, di
 
 
 class _Cycles:
-    """Cycles a pixel of frames: simulated, from a frame of the same method, or by the cycle model."""
+    """Cycles a pixel of frames: from simulation, from a frame of the same method, or from the cycle model."""
 
     def __init__(self, tasks: Sequence[Task], results: Sequence[Any], of_design: Mapping[tuple, dict]):
         self._of_design = of_design
@@ -298,28 +300,28 @@ def section(tasks: Sequence[Task], results: Sequence[Any]) -> Section:
 
     The page's script reads `Section.figures`:
 
-    - ``points``: a dictionary each, with
+    - ``points``: a dictionary for each point, with
 
       - ``id``, ``label``: texts; ``group``: a key of ``groups``;
       - ``settings``: all settings of the frame, such as ``source`` (the mesh), ``exponent``, ``method``,
         ``model``, ``width``, ``height``, ``operand`` if it is not the method's own, and ``engine``
         (``cxxrtl``: simulated, ``model``: by the bit-accurate model, ``float64``: by the golden renderer);
-      - ``command``: a line for a shell that reproduces it;
+      - ``command``: a line for a shell that reproduces the point;
       - ``errors``, ``times``: value or ``None`` for each key of ``errors`` or ``times`` below;
       - ``verdicts``: whether both frames look identical, for each kind of error: ``total``, ``method``,
         ``arithmetic``, ``model``;
-      - ``colors``: of its method, on light and on dark paper;
+      - ``colors``: colours of the method, on light and on dark paper;
       - ``hardware``: ``multipliers``, ``cells``, ``register_bits``, ``memory_bits``; after place and route
         ``luts``, ``fmax_mhz`` (the median), ``seeds_mhz``, and ``placed`` (the date); or ``None``;
       - ``counts``: ``pixels``, ``shown``, ``spans``, ``out_of_range_spans``, ``cycles``;
       - ``pictures``: ``frame``, ``error`` (map of the method error) and ``total`` (map of the total error),
-        data URIs of PNGs of one size; maps are transparent where there is no surface;
+        as data URIs of PNGs of the same size. Maps are transparent where there is no surface;
 
     - ``groups``: ``[{key, title}]``;
-    - ``errors``, ``times``: ``[{key, title, unit, better}]``, ``better`` being ``"less"`` or ``"more"``;
+    - ``errors``, ``times``: ``[{key, title, unit, better}]``. ``better`` is ``"less"`` or ``"more"``;
     - ``fronts``: ``{"error|time": [ids]}``, points on the Pareto front of each mesh and exponent;
-    - ``error_map``: ``{"colors": [...], "limits": [...]}``: the scale of all maps, with the colour
-      ``#rrggbb`` and the largest error in LSB of each step.
+    - ``error_map``: ``{"colors": [...], "limits": [...]}``, the scale of all maps. Each step has a colour
+      ``#rrggbb`` and a largest error in LSB.
 
     Parameters
     ----------

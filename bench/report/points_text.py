@@ -49,7 +49,7 @@ def front(error: Sequence[float | None], time: Sequence[float | None]) -> np.nda
     """
     values = np.array([error, time], dtype=np.float64)
     values[:, np.isnan(values).any(axis=0)] = np.nan
-    # [k, i, j]: measure k of point j against that of point i.
+    # [k, i, j]: measure k of point j against measure k of point i.
     no_worse = (values[:, np.newaxis] <= values[:, :, np.newaxis]).all(axis=0)
     better = (values[:, np.newaxis] < values[:, :, np.newaxis]).any(axis=0)
     return ~(no_worse & better).any(axis=1) & ~np.isnan(values).any(axis=0)
@@ -64,7 +64,7 @@ def _by_scene(points: Sequence[Mapping[str, Any]]) -> dict[tuple[str, int], list
 
 
 def _measured(points: Sequence[Mapping[str, Any]], kind: str, axis: Mapping[str, str]) -> list[float | None]:
-    """A measure of points, with its sign so that less is better."""
+    """A measure of points. Its sign is changed if more is better, so that less is always better."""
     # PSNR falls as RMSE grows, and equal images have no PSNR that JSON could hold.
     values = [point[kind][axis["key"].replace("psnr_db", "rmse_lsb")] for point in points]
     if axis["better"] == "less" or axis["key"].endswith("psnr_db"):
@@ -89,7 +89,7 @@ def fronts_of(points: Sequence[Mapping[str, Any]]) -> dict[str, list[str]]:
 
 
 def text(points: Sequence[Mapping[str, Any]]) -> list[str]:
-    """Paragraphs on the points: the trade of each mesh and exponent, and explanations of the measures."""
+    """Paragraphs about the points: error and time at each mesh and exponent, and the measures explained."""
     of_error = (
         "Errors are in steps (LSB) of an 8-bit channel of linear light, over the pixels that show the "
         "surface:\n\n"
@@ -170,9 +170,9 @@ def _glance(scene: Sequence[Mapping[str, Any]]) -> str:
     if border and border["pixels"]:
         most = max(point["border"]["lsb"] for point in hardware)
         text += (
-            f" All pixels count, also the {border['pixels']:,} pixels at the border of a light. There |N·L| "
-            f"is at most {BORDER:g}, and rounding may switch the light on or off. The largest total error of "
-            f"a design at the border is {most:.1f} LSB."
+            f" All pixels count. At {border['pixels']:,} of these pixels, the border of a light, |N·L| is at "
+            f"most {BORDER:g}, and rounding may switch the light on or off. The largest total error of a "
+            f"design at the border is {most:.1f} LSB."
         )
     return text
 

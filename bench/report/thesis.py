@@ -119,8 +119,10 @@ UNITS = {
     "quadratic interpolator": ("quadratic_interpolator", "quadratic"),
     "recurrence interpolator": ("recurrence_interpolator", "recurrence"),
 }
-"""Units of the claims: unit and variant in the table of ``blysk blocks``. An interpolator includes its setup,
-and gives N·L and N·H. The other entries are only the unit that works at every pixel, without the setup.
+"""Units of the claims: unit and variant in the table of ``blysk blocks``.
+
+An interpolator includes its setup, and gives N·L and N·H. The other entries are only the unit that works at
+every pixel, without the setup.
 """
 
 _SHADINGS = ("gouraud", "phong")
@@ -128,14 +130,14 @@ _SHADINGS = ("gouraud", "phong")
 
 @cache
 def counted(way: str, pixels: int) -> dict[str, float]:
-    """Operations for each result of a way, by kind (see `Counted`). The run counts them, setup included."""
+    """Operations for each result of a way, by kind (see `Counted`). Operations of the setup count, too."""
     counts: Counter[str] = Counter()
     found = sum(1 for _ in WAYS[way](*(Counted.of(x, counts) for x in random_operands()), pixels))
     return {kind: count / (found * SPANS) for kind, count in counts.items()}
 
 
 def price(printed: float, own: dict[str, float], other: dict[str, float]) -> float | None:
-    """Cheap operations that a costly operation must be worth, so that the counts give the printed ratio."""
+    """Cost of a costly operation, in cheap operations, at which the counts give the printed ratio."""
     dear = [sum(counts.get(kind, 0.0) for kind in DEAR) for counts in (own, other)]
     cheap = [sum(counts.values()) - of for counts, of in zip((own, other), dear, strict=True)]
     gain = dear[1] - printed * dear[0]
@@ -149,25 +151,28 @@ def _shown(counts: dict[str, float]) -> str:
 def software(way: str, baseline: str, pixels: int, printed: float, repeats: int) -> dict[str, Any]:
     """Two ways in software on the same spans: ratio of times, operations for each result, largest difference.
 
-    Both are NumPy in float64, vectorised over `SPANS` random spans of up to 45 degrees, their setup included.
+    Both ways are NumPy in float64, vectorised over `SPANS` random spans of up to 45 degrees. The setup is
+    included.
 
     Parameters
     ----------
     way, baseline : str
         Two of `WAYS`.
     pixels : int
-        Pixels of each span. For a bisection p, a power of two: p - 1 results, in a span of p + 1 pixels.
+        Pixels of each span. For a bisection this is p, a power of two. The bisection has p - 1 results, in a
+        span of p + 1 pixels.
     printed : float
         Claimed ratio of speeds.
     repeats : int
-        Runs of each; the fastest counts.
+        Runs of each way. The fastest run counts.
 
     Returns
     -------
     dict
-        ``ratio``: time of the baseline, divided by the way's. ``own``, ``other``: `counted` of both, in
-        words. ``price``: the result of `price` for both counts. ``difference``: largest difference of a
-        component of a normal, or of a cosine.
+        - ``ratio``: time of the baseline, divided by the time of the way;
+        - ``own``, ``other``: `counted` of both, in words;
+        - ``price``: the result of `price` for both counts;
+        - ``difference``: largest difference of a component of a normal, or of a cosine.
     """
     operands = random_operands()
     pair = WAYS[way], WAYS[baseline]
@@ -199,7 +204,7 @@ def prices(repeats: int) -> dict[str, float]:
     Parameters
     ----------
     repeats : int
-        Runs of each; the fastest counts.
+        Runs of each operation. The fastest run counts.
     """
     x = np.random.default_rng(1).uniform(0.5, 1, SPANS)
     actions = {"a multiplication": lambda: x * x, "a division": lambda: x / x}
@@ -217,12 +222,15 @@ def _parts(name: str) -> dict[str, int]:
 
 
 def hardware(unit: str, baseline: str) -> dict[str, float | None]:
-    """Cycles for each result, and parts, of the baseline divided by the unit. Both are from `UNITS`.
+    """Cycles for each result, and parts, of the baseline, divided by those of the unit.
+
+    Both are keys of `UNITS`.
 
     Returns
     -------
     dict
-        Ratios of ``interval``, ``multipliers``, ``cells``, ``register_bits``; ``None`` if the unit has none.
+        Ratios of ``interval``, ``multipliers``, ``cells`` and ``register_bits``. ``None`` if the unit's
+        figure is 0.
     """
     own, other = _parts(unit), _parts(baseline)
     kinds = ("interval", "multipliers", "cells", "register_bits")
@@ -239,7 +247,7 @@ def shading_share(triangles: int, width: int, height: int, repeats: int) -> dict
     width, height : int
         Size of the picture.
     repeats : int
-        Runs of each part, in turn. The fastest counts.
+        Runs of each part, in turn. The fastest run counts.
 
     Returns
     -------
@@ -275,10 +283,11 @@ def square_errors(method: str, triangles: int, width: int, height: int) -> dict[
     Returns
     -------
     dict
-        ``nmse``, ``published``, ``defined`` (share of values for which the published form is defined),
-        ``max_lsb`` and ``p999_lsb``; ``nearest``: share of MNSE that comes from the 1 % of values nearest the
-        mean; ``step``, for MNSE and for NMSE: error of the reference with 1 LSB more in its value nearest the
-        mean, divided by its error with 1 LSB more in its farthest value.
+        - ``nmse``, ``published``, ``max_lsb`` and ``p999_lsb``;
+        - ``defined``: share of values for which the published form is defined;
+        - ``nearest``: share of MNSE that comes from the 1 % of values nearest the mean;
+        - ``step``, a pair for MNSE and NMSE. One value of the reference gets 1 LSB more. The number is the
+          error for the value nearest the mean, divided by the error for the farthest value.
     """
     scene = scene_for(teapot(triangles), 50, width, height)
     design = preset(method, model_of(method))
@@ -418,7 +427,7 @@ def _steps(quick: bool) -> list[Claim]:
 
 
 def claims(quick: bool) -> list[Claim]:
-    """All claims. If quick, for two lengths of spans, small frames, and only the units without setup."""
+    """All claims. If quick, they are for two lengths of spans, small frames, and units without setup."""
     return [claim for table in _DOCUMENT.tables for claim in table.claims(quick)]
 
 

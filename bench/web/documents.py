@@ -57,7 +57,7 @@ def documents(folders: Mapping[str, Path]) -> tuple[dict[str, str], dict[str, Pa
     for name, folder in folders.items():
         for path in sorted(folder.rglob("*.[sp][vn]g")):
             pictures[f"{name}/{path.relative_to(folder).as_posix()}"] = path
-        # A folder without a page of its own takes its first page.
+        # In a folder without README.md the first page is also ``index.html``.
         first = "README" if (folder / "README.md").exists() else min(p.stem for p in folder.glob("*.md"))
         for path in sorted(folder.glob("*.md")):
             text = path.read_text(encoding="utf-8")
@@ -96,12 +96,12 @@ def _image(match: re.Match, name: str, folder: Path, pictures: dict[str, Path]) 
 
 
 def _link(match: re.Match, name: str, folders: Mapping[str, Path], sources: dict[str, Path]) -> str:
-    """A link of a page, changed to the files of the site. A source file that it leads to is added."""
+    """A link of a page, changed to the files of the site. If it leads to a source file, the file is added."""
     address, anchor, others, text = match[1], match[2] or "", match[3], match[4]
     if not address:
         return match[0]
-    # Links go by the names in the site, or by the present places of the files. Pages of the units may lie
-    # anywhere.
+    # A link follows the names in the site, or the present places of the files. Pages of the units may be in
+    # any folder.
     folder, _, file = posixpath.normpath(posixpath.join(name, address)).partition("/")
     if folder not in folders or not file or not (folders[folder] / file).is_file():
         target = (folders[name] / address).resolve()
@@ -120,7 +120,10 @@ def _link(match: re.Match, name: str, folders: Mapping[str, Path], sources: dict
 
 
 def _source(match: re.Match, name: str, target: Path, sources: dict[str, Path]) -> str:
-    """A link to the page of a Python file of the project, which is added. For another file the text alone."""
+    """A link to the page of a Python file of the project. The file is added.
+
+    For another file the result is the text alone.
+    """
     if target.suffix != ".py" or not target.is_file() or not target.is_relative_to(PROJECT):
         return match[4]
     file = target.relative_to(PROJECT).as_posix()

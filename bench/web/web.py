@@ -227,16 +227,16 @@ def make_site(
     Parameters
     ----------
     folder, report, folders
-        As for `write_site`. Without a report a quick report is measured.
+        As in `write_site`. Without a report a quick report is measured.
     designs : sequence of (method, model)
-        Designs of the modules. If empty, `DESIGNS`.
+        Designs of the modules. `DESIGNS` if empty.
     jobs : int
-        Processes.
+        Number of processes.
 
     Raises
     ------
     InputError
-        As `write_site`.
+        As in `write_site`.
     """
     work = tasks(designs or DESIGNS, {name: body.views for name, body in MESHES.items()})
     chosen = chosen_tasks(quick=True) if report is None else []

@@ -79,7 +79,7 @@ WIDTH, HEIGHT = 320, 240
 """Size of the pictures."""
 
 BANDS = (100, MAX_EXPONENT)
-"""Exponents for which spans are cut. A frame uses the smallest that is at least its own exponent."""
+"""Exponents for which spans are cut. A frame uses the smallest exponent that is at least its own."""
 
 ROUGHNESSES = tuple(round(step / 100, 2) for step in range(10, 101))
 """Roughnesses that a model with a roughness may have."""
@@ -282,7 +282,7 @@ def spans_of(mesh: str, view: int, exponent: int, design: ShadingPipeline) -> tu
     Parameters
     ----------
     mesh, view
-        As for `streams_of`.
+        As in `streams_of`.
     exponent : int
         One of `BANDS`.
     design : ShadingPipeline

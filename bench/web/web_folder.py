@@ -69,7 +69,7 @@ def check_folder(folder: Path) -> None:
     Raises
     ------
     InputError
-        If it is a file, holds other files, or may not be written.
+        If the folder is a file, holds other files, or may not be written.
     """
     names = files_within(folder, PAGE)
     mark = earlier(folder)
