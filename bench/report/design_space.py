@@ -153,7 +153,7 @@ def explored(tasks: Sequence[Task], results: Sequence[Any]) -> list[Explored]:
     return found
 
 
-def front_of(designs: Sequence[Explored], error: str, cost: str, *, given_values: bool = True) -> np.ndarray:
+def front_of(designs: Sequence[Explored], error: str, cost: str) -> np.ndarray:
     """Whether each design is on the Pareto front of largest error and cost: bool array.
 
     A design that flags spans as too wide is not on the front.
@@ -166,16 +166,8 @@ def front_of(designs: Sequence[Explored], error: str, cost: str, *, given_values
         One of `ERRORS`.
     cost : str
         One of `COSTS`.
-    given_values : bool
-        Whether to include designs whose spans have values of each light in place of normals. Their cost does
-        not include the computation of the values.
     """
-    errors = [
-        None
-        if one.out_of_range_spans or (one.candidate.design.interpolator.given_values and not given_values)
-        else one.errors[error]["max_lsb"]
-        for one in designs
-    ]
+    errors = [None if one.out_of_range_spans else one.errors[error]["max_lsb"] for one in designs]
     return front(errors, [one.costs[COSTS[cost]] for one in designs])
 
 

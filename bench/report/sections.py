@@ -14,7 +14,6 @@ SECTIONS: dict[str, str] = {
     "place-and-route": "blysk.bench.report.place_and_route",
     "geometry": "blysk.bench.report.geometry",
     "energy": "blysk.bench.report.energy",
-    "explore": "blysk.bench.report.explore",
     "thesis": "blysk.bench.report.thesis",
     "cosine-quadratic": "blysk.bench.report.cosine_quadratic",
     "phong-blinn": "blysk.bench.report.phong_blinn",

@@ -462,10 +462,8 @@ def _variants():
     yield "chord-local", Variant(partial(ShadingPipelineUnit, preset("chord-local", "cosquad")))
     for name, design in _COLORED.items():
         yield name, Variant(partial(ShadingPipelineUnit, design), long=True)
-    for name, design in DESIGNS.items():
-        yield name, Variant(partial(ShadingPipelineUnit, design))
-    for name, design in LONG_DESIGNS.items():
-        yield name, Variant(partial(ShadingPipelineUnit, design), long=True)
+    for name, design in (DESIGNS | LONG_DESIGNS).items():
+        yield name, Variant(partial(ShadingPipelineUnit, design), long=name in LONG_DESIGNS)
 
 
 RECORD = Record(
@@ -491,9 +489,7 @@ RECORD = Record(
     },
     waivers={
         "tables.read": "No table is written while beats read it, so the register may change on a write.",
-        "multiplier_0_product": (
-            "A reciprocal and its square are normalised, so their first bits are 1 already."
-        ),
+        "multiplier_0_product": "Reciprocals and their squares are normalised: their first bits are 1.",
     },
     still={
         "a counter stays at its largest value, and a flag stays 1": "top.status[15] top.status[31-32]",

@@ -22,7 +22,7 @@ from blysk.hdl.pipeline import ShadingPipelineUnit
 from blysk.hdl.pixel_pipelines import MergedPipelinesUnit
 from blysk.sim.errors import InputError
 from blysk.sim.frames.frame import beats_of, sample_material
-from blysk.sim.meshes.mesh import load_mesh
+from blysk.sim.meshes.teapot import teapot
 from blysk.sim.output import files_within, write_text
 
 __all__ = ["check_folder", "pixel_beats", "teapot_frame", "vectors", "write_testbench"]
@@ -56,7 +56,7 @@ def teapot_frame(
     pixels : Pixels
         The expected output, by the bit-accurate model.
     """
-    mesh = load_mesh("teapot", triangles=triangles).mesh
+    mesh = teapot(triangles)
     width, height = size
     materials = [
         replace(sample_material(design, 13 + k % 100), diffuse=tuple(np.roll((0.75, 0.42, 0.2), k)))

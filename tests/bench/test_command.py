@@ -171,3 +171,15 @@ def test_help_and_refused_options_of_modules_are_quick():
     code = MODULES.replace("HEAVY", repr(heavy))
     done = subprocess.run([sys.executable, "-c", code, *commands], capture_output=True, text=True, check=True)
     assert done.stdout == f"{{(0, 2)}} []\n{len(commands)}\n", done.stdout
+
+
+def test_records_load_no_mesh_reader():
+    """The records of all units need the teapot, which is computed, and no file of a mesh."""
+    code = """
+import sys
+from blysk.bench.units.registry import RECORDS
+meshes = {name for name in sys.modules if name.startswith("blysk.sim.meshes.")}
+print(meshes - {"blysk.sim.meshes.teapot"}, {"PIL", "matplotlib", "trimesh"} & sys.modules.keys())
+"""
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert done.stdout == "set() set()\n"

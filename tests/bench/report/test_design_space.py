@@ -10,7 +10,6 @@ import pytest
 from amaranth.hdl import UnusedElaboratable
 from click.testing import CliRunner
 
-from blysk.bench.accuracy import model_of
 from blysk.bench.quality import baselines
 from blysk.bench.report import design_space, explore
 from blysk.bench.report.design_space import (
@@ -253,17 +252,6 @@ def test_front_by_brute_force():
     for one, on_front in zip(designs, chosen, strict=True):
         assert on_front == (not one.out_of_range_spans and not any(beats(other, one) for other in usable))
     assert chosen.any()
-
-
-def test_front_without_designs_that_are_given_values():
-    """As if these were not there."""
-    methods = ("linear", "renormalise", "quadratic", "angular", "quotient", "chord-local")
-    designs = records(candidates=[Candidate(method, model_of(method)) for method in methods] * 10)
-    chosen = front_of(designs, "total", "multipliers", given_values=False)
-    others = [k for k, one in enumerate(designs) if one.candidate.method != "chord-local"]
-    assert len(others) == 50
-    expected = front_of([designs[k] for k in others], "total", "multipliers")
-    assert np.flatnonzero(chosen).tolist() == np.array(others)[expected].tolist()
 
 
 def test_designs_of_two_styles_share_the_errors_and_not_the_costs():

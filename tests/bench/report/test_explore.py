@@ -3,7 +3,6 @@
 
 import json
 import re
-import xml.etree.ElementTree as ET
 from dataclasses import replace
 from types import SimpleNamespace
 
@@ -11,13 +10,10 @@ import numpy as np
 import pytest
 from click.testing import CliRunner
 
-from blysk.bench import store
 from blysk.bench.cli.explore import command
 from blysk.bench.report import design_space, explore
-from blysk.bench.report.design_space import costs_of, explored, front_of
-from blysk.bench.report.explore import section, tasks
+from blysk.bench.report.design_space import costs_of
 from blysk.bench.tools.sweep import COSTS, Candidate
-from blysk.golden.presets import METHODS
 from blysk.golden.reference.raster import rasterise
 from blysk.sim.errors import InputError
 from blysk.sim.frames.error_names import ERRORS
@@ -213,53 +209,3 @@ def test_processes_and_a_cluster_give_the_same(monkeypatch, tmp_path):
         explored_by("--cluster", local.scheduler_address)
     assert outputs[0] == outputs[1] == outputs[2]
     assert "blysk verilog --method linear --model cosquad --style compact" in outputs[0]
-
-
-# The section.
-
-
-@pytest.mark.long
-def test_section_of_real_results():
-    """A few designs at the size of the quick report: every row against its results."""
-    todo = tasks(quick=True)
-    assert len(todo) == 20
-    results = store.results_of(todo)
-    made = section(todo, results)
-    drawing, table = made.parts
-    assert ET.fromstring(drawing.svg).tag.endswith("svg")
-    rows = table.records()
-    others = [
-        (m, n) for m in ("linear", "renormalise", "quadratic", "chord-local") for n in ("blinn", "cosquad")
-    ]
-    assert [(row["method"], row["model"]) for row in rows] == [
-        *(("quotient", "blinn"), ("quotient", "phong"), *others)
-    ]
-    (own,) = (row for row in rows if (row["method"], row["model"]) == ("quotient", "blinn"))
-    # phong draws another picture: of the others no design has less error with as few cells.
-    assert not [
-        row
-        for row in rows
-        if row["model"] != "phong"
-        and row["largest total error, LSB"] < own["largest total error, LSB"]
-        and row["cells"] <= own["cells"]
-    ]
-    assert len(made.figures["designs"]) == len(rows)
-    for row, design in zip(rows, made.figures["designs"], strict=True):
-        assert row["largest total error, LSB"] == design["errors"]["total"]["max_lsb"]
-        assert row["cells"] == design["costs"]["cells"]
-    for error in ("method", "total"):
-        for cost in ("cells", "multipliers"):
-            chosen = front_of(explored(todo, results), error, cost, given_values=False)
-            assert [row[f"front of {error} error and {cost}"] for row in rows] == chosen.tolist()
-            assert chosen.any()
-    json.dumps(made.figures, allow_nan=False)
-    under = [row for row in rows if row["largest method error, LSB"] <= 1 and not row["spans too wide"]]
-    for given in (False, True):
-        least = min(row["cells"] for row in under if (row["method"] == "chord-local") == given)
-        assert f"takes {least:,} cells" in " ".join(made.text)
-
-
-def test_full_section_sweeps_everything():
-    todo = tasks(quick=False)
-    assert {task.settings["candidate"]["method"] for task in todo} == set(METHODS)
-    assert not any(task.timed for task in todo)
