@@ -13,14 +13,11 @@ from blysk.bench.report.errata import FACTOR_PUBLISHED, ROOT_PUBLISHED
 from blysk.bench.report.thesis import (
     SPEEDS,
     UNITS,
-    counted,
     hardware,
-    price,
-    prices,
     shading_share,
-    software,
     square_errors,
 )
+from blysk.bench.report.thesis_software import counted, price, prices, software
 from blysk.bench.report.thesis_ways import SPANS, WAYS, random_operands
 from blysk.bench.speed.renderer_times import Timing
 from blysk.bench.tools.blocks import entry_of
