@@ -96,10 +96,7 @@ class QuotientSpansUnit(wiring.Component):
     """Stages of the sums, and of the shifted differences."""
 
     def __init__(
-        self,
-        model: QuotientSpans | None = None,
-        length_bits: int = LENGTH_BITS,
-        serial: bool = False,
+        self, model: QuotientSpans | None = None, length_bits: int = LENGTH_BITS, serial: bool = False
     ):
         self.model = p = model or QuotientSpans()
         self.length_bits, self.serial = length_bits, serial
@@ -488,9 +485,9 @@ class QuotientSpansUnit(wiring.Component):
         """Sign of z of a light."""
         p, (step, start) = self.model, given
         width = p.HEIGHT_FORMAT.width
-        names = ("height", "height_step", "next_height_step")
         height, current, following = (
-            Signal(signed(width), name=f"{name}_{light}", reset_less=True) for name in names
+            Signal(signed(width), name=f"{name}_{light}", reset_less=True)
+            for name in ("height", "height_step", "next_height_step")
         )
         begin = Cat(Const(0, width - len(start)), start).as_signed()
         # z times 2^16 has the binary point of a line. Both differences may be taken on the same cycle.
