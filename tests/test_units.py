@@ -108,6 +108,8 @@ def one_netlist():
 def digest_of_runs(unit, pace, runs):
     """Digest of all that `test_equals_model` asserts of a unit."""
     times = [getattr(unit, name, None) for name in ("latency", "initiation_interval", "skid")]
+    # A latency that depends on the beat is a method. The run does not assert it.
+    times = [None if callable(time) else time for time in times]
     said = [
         (run.case.beats, run.case.sent, run.expected, run.status, run.stalls, run.settles) for run in runs
     ]
