@@ -1,6 +1,6 @@
 """Framing: a core between streams of bytes, which mark the start and end of packets and frames."""
 
-from amaranth.hdl import Const, Module, Signal, Value, unsigned
+from amaranth.hdl import Module, Signal, Value, unsigned
 from amaranth.lib import data, stream, wiring
 from amaranth.lib.wiring import In, Out
 
@@ -98,11 +98,11 @@ class FramingUnit(wiring.Component):
         for name in ("write", "memory"):
             if name in self.signature.members:
                 wiring.connect(m, wiring.flipped(getattr(self, name)), getattr(core, name))
-        picture, keep = Signal(name="picture"), Const(1)
+        picture = None
         if "constants" in self.signature.members:
             given = {name: self.constants[name] for name in self.constants.shape().members}
             if "keep" in given:
-                keep, given["picture"] = given.pop("keep"), picture
+                keep, given["picture"] = given.pop("keep"), (picture := Signal(name="picture"))
             m.d.comb += [core.constants[name].eq(value) for name, value in given.items()]
 
         active, ending, accept = Signal(name="active"), Signal(name="ending"), Signal(name="accept")
@@ -114,7 +114,8 @@ class FramingUnit(wiring.Component):
             self.i.ready.eq(core.i.ready & ~ending),
             accept.eq(self.i.valid & self.i.ready),
         ]
-        m.d.sync += picture.eq(picture ^ (accept & ~active & ~keep))
+        if picture is not None:
+            m.d.sync += picture.eq(picture ^ (accept & ~active & ~keep))
         with m.If(accept):
             m.d.sync += [active.eq(1), ending.eq(self.i.payload.last), settles.eq(_SETTLES)]
         with m.Elif(settles != 0):
