@@ -183,5 +183,8 @@ RECORD = Record(
             "If the controlling bit is 1, the product is 1024 or more, and the channel saturates."
         ),
     },
-    still={"the largest sum, of three terms of 8 full channels, is 6120": "rounded_{r,g,b}[13]"},
+    still={
+        "the largest sum, of three terms of 8 full channels, is 6120": "rounded_{r,g,b}[13]",
+        "a colour is a constant of the run, written once": "color_{diffuse,specular}_0_{r,g,b}[0-16]",
+    },
 )
