@@ -19,7 +19,7 @@ from blysk.hdl.core.views import copy, copy_fields
 from blysk.hdl.frame_constants import FrameConstantsUnit, existing_material, write_shape
 from blysk.hdl.methods.registry import unit_of
 from blysk.hdl.pixel_assembler import PixelAssemblerUnit, coordinates_shape, pixel_shape
-from blysk.hdl.pixel_shading import PixelShading
+from blysk.hdl.pixel_shading import COMPACT_INTERVAL, PixelShading
 
 __all__ = ["ShadingPipelineUnit", "span_shape", "status_shape"]
 
@@ -114,8 +114,9 @@ class ShadingPipelineUnit(wiring.Component):
     - with an albedo, a third of the albedo's multipliers in the throughput style.
 
     ``quotient`` has ``ceil((2 + 2 lights) / 3)`` for its quotients and one for the setup. A pixel takes the
-    larger of two numbers of cycles:
+    largest of three numbers of cycles:
 
+    - 3, with one channel, too: the products of a pixel share multipliers;
     - ``channels max(1, T)``, or ``channels (1 + T)`` with an albedo, where T is the number of its diffuse and
       specular terms that are not 0 (see `Intensity.cycles`);
     - one cycle for each product of the specular model (42 for a power), if a light is in front of the surface
@@ -193,8 +194,7 @@ class ShadingPipelineUnit(wiring.Component):
     def _make_albedo(self) -> None:
         """The albedo path, and the times that follow from it."""
         p, shading = self.model, self._shading
-        # In the compact style a pixel takes at least one cycle for each channel.
-        interval = 3 if p.build.compact else 1
+        interval = COMPACT_INTERVAL if p.build.compact else 1
         self._albedo = AlbedoUnit(p.albedo, p.length_bits, interval)
         behind = shading.latency - shading.light_latency + self._assembler.latency
         before = self.latency - behind if p.lights else 0
@@ -210,8 +210,7 @@ class ShadingPipelineUnit(wiring.Component):
         compact, setup_interval, product_interval = p.build.compact, p.build.setup_interval, 1
         method = unit_of(p.interpolator)
         if compact:
-            # A pixel takes at least one cycle for each channel.
-            product_interval = p.intensity.channels
+            product_interval = COMPACT_INTERVAL
             if setup_interval is None:
                 setup_interval = max(method.setup_intervals(p.interpolator), default=None)
         self._interpolator = method(

@@ -17,7 +17,12 @@ from blysk.hdl.lighting.factor import FactorUnit
 from blysk.hdl.lighting.light import LightUnit, kind_of
 from blysk.hdl.lighting.transfer import TransferUnit
 
-__all__ = ["PixelShading"]
+__all__ = ["COMPACT_INTERVAL", "PixelShading"]
+
+COMPACT_INTERVAL = 3
+"""Cycles in which the products of a pixel share multipliers in the compact style, with one channel, too.
+
+The colours of three channels take as many cycles at least."""
 
 
 class PixelShading:
@@ -75,8 +80,7 @@ class PixelShading:
             self.tables = kind.memory(p.specular, p.lights)
         # Lights in lockstep need equal latencies. So if one light fades, every light has a factor unit.
         waiting = range(p.lights) if p.factors and not compact else p.factors
-        # In the compact style a colour takes at least one cycle for each channel.
-        interval = max(kind.compact_interval(p.specular, exponent), p.intensity.channels) if compact else 1
+        interval = max(kind.compact_interval(p.specular, exponent), COMPACT_INTERVAL) if compact else 1
         return [
             LightUnit(
                 p.specular,
