@@ -21,8 +21,12 @@ PROJECT = Path(__file__).parents[3]
 APART = (
     *("dot_product", "difference_accumulator", "coarse_depth", "halfway_vector", "mirror_adapter"),
     *("span_halver", "vector_adapter", "light_adapter", "bisection_chain", "arccos", "chord", "half_chord"),
+    "serial_vectors",
 )
 """Two small units, and parts of other structures than those of the cores."""
+
+WITH_ALBEDO = "albedo, both, tints, chord-local, 2 lights, srgb"
+"""A long variant of the pipeline, which has the units of an albedo."""
 
 CORES = {
     "everything": Everything,
@@ -33,7 +37,8 @@ CORES = {
     re.sub(r"\W+", "_", f"{name} {variant}").strip("_"): given.unit
     for name, record in RECORDS.items()
     for variant, given in record.variants.items()
-    if (name == "pipeline" and not given.long) or (variant == record.default and name in (*WHOLE, *APART))
+    if (name == "pipeline" and (not given.long or variant == WITH_ALBEDO))
+    or (variant == record.default and name in (*WHOLE, *APART))
 }
 """By names of modules: some of their own, the pipelines, and what is in none of them."""
 
