@@ -4,7 +4,7 @@ Frames are compared as they are encoded: in the space of the codes of the design
 """
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import asdict, dataclass, fields, replace
 from time import perf_counter
 from typing import Any
@@ -17,7 +17,7 @@ from blysk.golden.frames.frame import Picture
 from blysk.golden.frames.local import line_ends, local_operands
 from blysk.golden.geometry.scene_triangles import SceneTriangles
 from blysk.golden.pipeline import ShadingPipeline
-from blysk.golden.reference.metrics import ErrorFigures, error_figures, mnse_published, nmse
+from blysk.golden.reference.metrics import ErrorFigures, error_figures, error_map, mnse_published, nmse
 from blysk.golden.reference.raster import Raster, rasterise
 from blysk.golden.reference.reflection import BLINN, ReflectionModel
 from blysk.golden.reference.renderer import (
@@ -39,6 +39,9 @@ __all__ = [
     "method_in_float64",
     "target_of",
 ]
+
+_PART = 1 << 20
+"""Pixels of a part of a frame."""
 
 
 @dataclass(frozen=True)
@@ -263,8 +266,8 @@ def _compare(
     figures |= {"visible_pixels": len(pixels), "border_pixels": int(np.count_nonzero(border))}
 
     if cut_raster is not None and mask.any():
-        same_method = timed(method_in_float64, scene, design, cut_raster)
-        figures["arithmetic_error"] = _errors(image, same_method.reshape(-1, 3)[pixels], border)
+        same_method = timed(method_in_float64, scene, design, cut_raster).reshape(-1, 3)[pixels]
+        figures["arithmetic_error"] = _errors(image, same_method, border)
         del same_method
     if target != model and mask.any():
         exact = encode_frame(timed(render, scene, "phong", target, raster).image, transfer)
@@ -273,14 +276,18 @@ def _compare(
         figures |= _mean_squares(image, exact)
         del exact
     golden = timed(render, scene, "phong", model, raster).image
-    exact = golden.reshape(-1, 3)[pixels]
+    exact = golden.reshape(-1, 3)
     if isinstance(bound, np.ndarray):
-        steady = ~border
-        bound = bound.reshape(-1, 3)[pixels][steady] if steady.any() else None
-        figures["bound_lsb"] = None if bound is None else encoded_bound(bound, exact[steady], transfer)
+        bound = bound.reshape(-1, 3)
+        parts = _parts(pixels[~border])
+        figures["bound_lsb"] = max(
+            (encoded_bound(bound[part], exact[part], transfer) for part in parts), default=None
+        )
+    elif bound is None:
+        figures["bound_lsb"] = None
     else:
-        least = exact.min(initial=1)
-        figures["bound_lsb"] = None if bound is None else encoded_bound(bound, least, transfer)
+        least = min((float(exact[part].min()) for part in _parts(pixels)), default=1.0)
+        figures["bound_lsb"] = encoded_bound(bound, least, transfer)
     golden = encode_frame(golden, transfer)
     if not mask.any():
         figures |= dict.fromkeys(("method_error", "total_error"), nothing)
@@ -294,13 +301,18 @@ def _compare(
     return Comparison(golden=golden, seconds=seconds, **figures)
 
 
+def _parts(pixels: np.ndarray) -> Iterator[np.ndarray]:
+    """Indices of pixels part by part, as a large frame has 400 MB."""
+    for start in range(0, len(pixels), _PART):
+        yield pixels[start : start + _PART]
+
+
 def _errors(image: np.ndarray, exact: np.ndarray, border: np.ndarray) -> FrameErrors:
     """Errors of an image against a frame in [0, 1]; ``border`` marks the pixels at the border of a light."""
-    parts = (
-        error_figures(image[of], exact[of], scale=255).max_lsb if of.any() else 0.0
-        for of in (~border, border)
-    )
-    return FrameErrors(*asdict(error_figures(image, exact, scale=255)).values(), *parts)
+    figures = error_figures(image, exact, scale=255)
+    worst = error_map(image[np.newaxis], exact[np.newaxis])[0]
+    parts = (float(worst[of].max(initial=0)) for of in (~border, border))
+    return FrameErrors(*asdict(figures).values(), *parts)
 
 
 def _mean_squares(image: np.ndarray, exact: np.ndarray) -> dict[str, float]:
