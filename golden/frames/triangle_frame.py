@@ -68,10 +68,12 @@ def sent_triangles(scene: Scene, renderer: Renderer, angle: float | None = None)
     Raises
     ------
     ValueError
-        If the scene has point lights or a near viewer.
+        If the scene has point lights, a near viewer or a material with a cutoff of alpha.
     """
     if scene.local:
         raise ValueError("point lights and a near viewer need spans with values, which triangles do not give")
+    if scene.cutoffs:
+        raise ValueError("hardware geometry drops no pixels by alpha; leave out the cutoff")
     angle = SPAN_ANGLE if angle is None else angle
     design = renderer.design
     axes = triangle_axes(scene, design)

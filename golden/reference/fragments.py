@@ -3,7 +3,7 @@
 import numpy as np
 
 from blysk.golden.reference.faces import face_normals
-from blysk.golden.reference.geometry import sum_of_components
+from blysk.golden.reference.geometry import shares_between
 from blysk.golden.reference.raster import Raster
 from blysk.golden.reference.scene import Scene
 
@@ -40,9 +40,7 @@ def fragment_barycentrics(raster: Raster, which: np.ndarray) -> np.ndarray:
     if len(raster.weights_left) != len(raster.length):
         raise ValueError("point lights, a near viewer and an albedo need the weights of the spans")
     span, t = _position(raster, which)
-    weights = (1 - t) * raster.weights_left[span] + t * raster.weights_right[span]
-    found: np.ndarray = weights / sum_of_components(weights)[:, np.newaxis]
-    return found
+    return shares_between(raster.weights_left[span], raster.weights_right[span], t)
 
 
 def fragment_normals(scene: Scene, raster: Raster, which: np.ndarray) -> np.ndarray:

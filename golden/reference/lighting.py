@@ -1,5 +1,6 @@
 """A material, and the intensity that a normal gives under lights, in float64."""
 
+import math
 import operator
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -83,11 +84,18 @@ class Material:
     unlit : bool
         Whether the surface shows ``diffuse``, times texture and vertex colours, whatever the lights. Then
         there is no ambient, diffuse or specular light.
+    alpha : float
+        Alpha of the surface, 0 to 1. It multiplies alpha of the texture and of the vertices, and counts only
+        with a cutoff.
+    cutoff : float, optional
+        Least alpha that is drawn, at least 0. A pixel with a smaller alpha is dropped before the depth test,
+        see `dropped_fragments`. ``None``: all pixels are drawn.
 
     Raises
     ------
     ValueError
-        If a coefficient is negative or not finite, or the exponent or the roughness is out of range.
+        If a coefficient is negative or not finite, or the exponent, the roughness, the alpha or the cutoff is
+        out of range.
     TypeError
         If the exponent is not an integer.
     """
@@ -103,8 +111,15 @@ class Material:
     emission: Triple = (0.0, 0.0, 0.0)
     tinted: bool = False
     unlit: bool = False
+    alpha: float = 1.0
+    cutoff: float | None = None
 
     def __post_init__(self) -> None:
+        object.__setattr__(self, "alpha", float(self.alpha))
+        if not 0 <= self.alpha <= 1:
+            raise ValueError(f"a material's alpha must be in 0 to 1, not {self.alpha}")
+        if self.cutoff is not None and not 0 <= self.cutoff < math.inf:
+            raise ValueError(f"a material's cutoff must be a finite number from 0, not {self.cutoff}")
         for name in ("ambient", "diffuse", "specular", "emission"):
             object.__setattr__(self, name, color_triple(f"a material's {name}", getattr(self, name)))
         object.__setattr__(self, "exponent", operator.index(self.exponent))

@@ -7,8 +7,9 @@ from typing import NamedTuple
 import numpy as np
 
 from blysk.golden.number.spans import runs_of
+from blysk.golden.reference.cutout import dropped_fragments
 from blysk.golden.reference.faces import face_normals, seen_from_behind
-from blysk.golden.reference.geometry import any_component, normalise, sum_of_components
+from blysk.golden.reference.geometry import any_component, normalise, shares_between, sum_of_components
 from blysk.golden.reference.levels import span_levels
 from blysk.golden.reference.scene import Scene
 
@@ -62,7 +63,7 @@ class Raster:
         ``y * width + x``.
     visible : bool array, shape (F,)
         Whether the fragment is the nearest of its pixel; at equal depth the lowest triangle index counts as
-        nearest.
+        nearest. Dropped fragments do not count, see `dropped_fragments`.
     triangles : int
         Number of triangles of the mesh. A triangle is drawn if it has spans before the depth test. Else one
         of the next four counters counts it once.
@@ -76,12 +77,14 @@ class Raster:
     uncovered : int
         Triangles that hold no pixel centre of the picture.
     hidden_spans : int
-        Spans that were left out because all of their pixels are hidden.
+        Spans that were left out because all of their pixels are hidden or dropped.
     repaired_normals : int
         Ends of spans whose interpolated normal was 0. The face's normal takes its place.
     level : int8 array, shape (S,)
         Level of each span's texture, see `span_levels`. Empty if no face has a texture with several levels.
         Parts of a span have the level of the whole span.
+    dropped : int
+        Fragments that were dropped before the depth test, as their alpha is under the cutoff.
     """
 
     x: np.ndarray
@@ -107,6 +110,7 @@ class Raster:
     hidden_spans: int
     repaired_normals: int
     level: np.ndarray = field(default_factory=lambda: np.zeros(0, dtype=np.int8))
+    dropped: int = 0
 
 
 @dataclass(frozen=True)
@@ -275,7 +279,8 @@ def rasterise(scene: Scene) -> Raster:
     triangle if its centre lies inside, or exactly on a left or top edge. Edge functions are integers. So the
     test is exact, and no pixel of a shared edge is drawn twice or missed. Each scanline's interval comes from
     an exact floor division. Depth is interpolated in float64, linearly on the screen (1/W, or the depth
-    itself in the orthographic projection).
+    itself in the orthographic projection). Fragments under the cutoff of their material are dropped before
+    the depth test, see `dropped_fragments`.
 
     Parameters
     ----------
@@ -302,7 +307,7 @@ def rasterise(scene: Scene) -> Raster:
     for row, triangles in zip(present, (left_over, solid, pieces.triangle), strict=False):
         row[triangles] = True
 
-    (piece, left, line, length), owner = _drawn(pieces, width, height)
+    (piece, left, line, length), owner, dropped = _drawn(scene, pieces)
     count = len(piece)
     present[3, pieces.triangle[piece]] = True
     seen = np.zeros(count, dtype=bool)
@@ -357,11 +362,18 @@ def rasterise(scene: Scene) -> Raster:
         hidden_spans=count - len(kept),
         repaired_normals=sum(int(end.lost.sum()) for end in ends),
         level=level.astype(np.int8),
+        dropped=dropped,
     )
 
 
-def _drawn(pieces: _Pieces, width: int, height: int) -> tuple[np.ndarray, np.ndarray]:
-    """Piece, first x, y and length of every span, shape (4, spans); the span that a pixel shows, or -1."""
+def _drawn(scene: Scene, pieces: _Pieces) -> tuple[np.ndarray, np.ndarray, int]:
+    """Piece, first x, y and length of every span, shape (4, spans); the span that a pixel shows, or -1.
+
+    Also returns the number of dropped fragments.
+    """
+    width, height = scene.width, scene.height
+    cut_out = np.isin(scene.mesh.material[pieces.triangle], list(scene.cutoffs))
+    dropped = 0
     owner = np.full(width * height, -1, dtype=np.int32)
     buffer = np.full(width * height, -np.inf)
     columns = []
@@ -374,6 +386,10 @@ def _drawn(pieces: _Pieces, width: int, height: int) -> tuple[np.ndarray, np.nda
             offset = _counting(lengths)
             pixel = np.repeat(first_pixel[run], lengths) + offset
             value = np.repeat(nearness[run], lengths) + np.repeat(step[run], lengths) * offset
+            if cut_out[piece[run]].any():
+                which = _dropped(scene, pieces, cut_out, piece[run], left[run], line[run], lengths)
+                value[which] = -np.inf
+                dropped += int(which.sum())
             before = buffer[pixel]
             np.maximum.at(buffer, pixel, value)
             # A pixel must be nearer than the stored depth. At equal depth the lower triangle, drawn before,
@@ -384,7 +400,32 @@ def _drawn(pieces: _Pieces, width: int, height: int) -> tuple[np.ndarray, np.nda
             index = np.repeat(np.arange(count + run.start, count + run.stop, dtype=np.int32), lengths)
             owner[pixel[winner]] = index[winner]
         count += len(piece)
-    return np.concatenate([np.zeros((4, 0), dtype=np.int32), *columns], axis=1), owner
+    return np.concatenate([np.zeros((4, 0), dtype=np.int32), *columns], axis=1), owner, dropped
+
+
+def _dropped(
+    scene: Scene,
+    pieces: _Pieces,
+    cut_out: np.ndarray,
+    piece: np.ndarray,
+    left: np.ndarray,
+    line: np.ndarray,
+    length: np.ndarray,
+) -> np.ndarray:
+    """Whether each fragment of spans is dropped, see `dropped_fragments`; ``cut_out`` marks pieces."""
+    of = cut_out[piece]
+    found = np.repeat(of, length)
+    piece, left, line, length = piece[of], left[of], line[of], length[of]
+    triangle = pieces.triangle[piece]
+    ends = [_weights(pieces, piece, column, line) for column in (left, left + length - 1)]
+    level = np.zeros(len(piece), dtype=np.int64)
+    if any(texture.mipmapped for texture in scene.textures.values()):
+        level = span_levels(scene, triangle, ends, _slopes(pieces, piece))
+    t = _counting(length) / np.repeat(np.maximum(length - 1, 1), length)
+    spans = np.repeat(np.arange(len(length)), length)
+    shares = shares_between(ends[0][spans], ends[1][spans], t[:, np.newaxis])
+    found[np.flatnonzero(found)] = dropped_fragments(scene, triangle[spans], shares, level[spans])
+    return found
 
 
 class _End(NamedTuple):

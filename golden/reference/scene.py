@@ -132,6 +132,13 @@ class Scene:
         return bool(self.mesh.colors.size or self.textures)
 
     @property
+    def cutoffs(self) -> dict[int, Material]:
+        """Materials with a cutoff by their index, of materials that faces have."""
+        given = {index: of for index, of in enumerate(self.materials) if of.cutoff is not None}
+        used = np.unique(self.mesh.material).tolist() if given else []
+        return {index: given[index] for index in used if index in given}
+
+    @property
     def culls(self) -> np.ndarray:
         """Whether each triangle is left out if it is seen from behind: bool array, shape (faces,)."""
         return (self.back_faces == "cull") & ~self.two_sided

@@ -1,6 +1,6 @@
 """Textures: images on a surface in linear light, and the rule of their samples in float64."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
 
 import numpy as np
@@ -65,6 +65,8 @@ class Texture:
         One of `FILTERS`.
     mipmapped : bool
         Whether smaller images than level 0 are used.
+    alpha : float64 array, shape (height, width), optional
+        Alpha of the texels, 0 to 1, with the same levels and samples. Empty: none, which is 1.
 
     Raises
     ------
@@ -78,6 +80,7 @@ class Texture:
     wrap: tuple[str, str] = ("repeat", "repeat")
     filter: str = "bilinear"
     mipmapped: bool = True
+    alpha: np.ndarray = field(default_factory=lambda: np.zeros((0, 0)))
 
     def __post_init__(self) -> None:
         texels = np.asarray(self.texels, dtype=np.float64)
@@ -89,6 +92,12 @@ class Texture:
                 raise ValueError(f"a texture's sides must be powers of two to {LARGEST_TEXTURE}, not {side}")
         if not ((texels >= 0) & (texels <= 1)).all():
             raise ValueError("texels must be 0 to 1")
+        alpha = np.asarray(self.alpha, dtype=np.float64)
+        object.__setattr__(self, "alpha", alpha)
+        if alpha.size and alpha.shape != texels.shape[:2]:
+            raise ValueError(f"alpha must have shape {texels.shape[:2]}, not {alpha.shape}")
+        if not ((alpha >= 0) & (alpha <= 1)).all():
+            raise ValueError("alpha must be 0 to 1")
         object.__setattr__(self, "wrap", tuple(self.wrap))
         if len(self.wrap) != 2 or not set(self.wrap) <= set(WRAPS):
             raise ValueError(f"wrap must be two of {', '.join(WRAPS)}, not {self.wrap}")
@@ -104,11 +113,19 @@ class Texture:
     @cached_property
     def levels(self) -> tuple[np.ndarray, ...]:
         """Images of all levels that are used, each a float64 array of shape (height, width, 3)."""
-        levels = [self.texels]
+        return self._levels(self.texels)
+
+    @cached_property
+    def alpha_levels(self) -> tuple[np.ndarray, ...]:
+        """Alpha of all levels that are used, each a float64 array of shape (height, width, 1)."""
+        return self._levels(self.alpha[..., np.newaxis])
+
+    def _levels(self, image: np.ndarray) -> tuple[np.ndarray, ...]:
+        levels = [image]
         while self.mipmapped and max(levels[-1].shape[:2]) > 1:
-            height, width, _ = levels[-1].shape
+            height, width, channels = levels[-1].shape
             rows, columns = max(height // 2, 1), max(width // 2, 1)
-            blocks = levels[-1].reshape(rows, height // rows, columns, width // columns, 3)
+            blocks = levels[-1].reshape(rows, height // rows, columns, width // columns, channels)
             levels.append(blocks.mean(axis=(1, 3)))
         return tuple(levels)
 
@@ -147,15 +164,37 @@ class Texture:
         -------
         float64 array, shape (places, 3)
         """
+        return self._samples(self.levels, coordinates, level)
+
+    def sample_alpha(self, coordinates: np.ndarray, level: np.ndarray) -> np.ndarray:
+        """Alpha at places of the surface, by the rule of `sample`; 1 for a texture without alpha.
+
+        Parameters
+        ----------
+        coordinates, level
+            As for `sample`.
+
+        Returns
+        -------
+        float64 array, shape (places,)
+        """
+        if not self.alpha.size:
+            return np.ones(len(coordinates))
+        return self._samples(self.alpha_levels, coordinates, level)[:, 0]
+
+    def _samples(
+        self, levels: tuple[np.ndarray, ...], coordinates: np.ndarray, level: np.ndarray
+    ) -> np.ndarray:
+        """Samples of the channels of images, shape (places, channels)."""
         coordinates, level = np.asarray(coordinates, dtype=np.float64), np.asarray(level)
-        color = np.empty((len(coordinates), 3))
+        found = np.empty((len(coordinates), levels[0].shape[-1]))
         for number in np.unique(level):
             chosen = np.flatnonzero(level == number)
-            color[chosen] = self._sample(self.levels[number], coordinates[chosen])
-        return color
+            found[chosen] = self._sample(levels[number], coordinates[chosen])
+        return found
 
     def _sample(self, image: np.ndarray, coordinates: np.ndarray) -> np.ndarray:
-        """Colours at places, by one level."""
+        """Samples at places, by one level."""
         size = np.array(image.shape[1::-1])
         place = coordinates * size
         if self.filter == "nearest":
@@ -168,7 +207,7 @@ class Texture:
         place = place - 0.5
         first = np.floor(place).astype(np.int64)
         share = place - first
-        color = np.zeros((len(place), 3))
+        color = np.zeros((len(place), image.shape[-1]))
         for right in (0, 1):
             column = wrapped(first[:, 0] + right, size[0], self.wrap[0])
             for lower in (0, 1):

@@ -92,6 +92,12 @@ class Paint:
     """Of u and of v, in the words of `numpy.pad`: ``wrap``, ``symmetric``, ``edge``."""
     order: int = 1
     """1: bilinear; 0: nearest."""
+    alpha: np.ndarray | None = None
+    """Of vertices."""
+    opacity: np.ndarray | None = None
+    """Alpha of the image, of shape (height, width)."""
+    cut: tuple = ()
+    """Triangles of which points are not seen where the product of both is under a half."""
 
     def at(self, index, weights):
         """Albedo at points of a triangle, from barycentric coordinates of shape (..., 3)."""
@@ -100,18 +106,28 @@ class Paint:
             albedo = albedo * (weights @ self.colors[face])
         if self.image is None:
             return albedo
-        return albedo * self.texel(weights @ self.coordinates[face])
+        return albedo * self.texel(self.image, weights @ self.coordinates[face])
 
-    def texel(self, place):
-        """Colours of the image, continued as far as the places of shape (..., 2) go."""
-        size = np.array(self.image.shape[1::-1])
+    def seen(self, index, weights):
+        """Whether points of a triangle are seen."""
+        face, alpha = self.faces[index], np.ones(weights.shape[:-1])
+        if self.alpha is not None:
+            alpha = weights @ self.alpha[face]
+        if self.opacity is not None:
+            alpha = alpha * self.texel(self.opacity[..., None], weights @ self.coordinates[face])[..., 0]
+        return alpha >= 0.5
+
+    def texel(self, image, place):
+        """Channels of an image, continued as far as the places of shape (..., 2) go."""
+        size = np.array(image.shape[1::-1])
         # Centres of texels at whole numbers.
         x, y = np.moveaxis(place * size - 0.5, -1, 0)
         margin = 2 + int(np.ceil(max(-x.min(), -y.min(), x.max() - size[0], y.max() - size[1], 0)))
-        whole = np.pad(self.image, ((0, 0), (margin, margin), (0, 0)), self.wrap[0])
+        whole = np.pad(image, ((0, 0), (margin, margin), (0, 0)), self.wrap[0])
         whole = np.pad(whole, ((margin, margin), (0, 0), (0, 0)), self.wrap[1])
         at = [y + margin, x + margin]
-        return np.stack([map_coordinates(whole[..., k], at, order=self.order) for k in range(3)], axis=-1)
+        channels = [map_coordinates(of, at, order=self.order) for of in np.moveaxis(whole, -1, 0)]
+        return np.stack(channels, axis=-1)
 
 
 @dataclass
@@ -184,6 +200,8 @@ def cast(
         from_behind = ray @ np.cross(corners[1] - corners[0], corners[2] - corners[0]) > 0
         if index in one_sided:
             hit &= ~from_behind
+        if paint is not None and index in paint.cut and hit.any():
+            hit[hit] = paint.seen(index, weights[hit])
         nearer = hit & (t < depth[place])
         second[place] = np.where(
             nearer, depth[place], np.where(hit, np.minimum(second[place], t), second[place])

@@ -174,3 +174,38 @@ def test_near_plane():
     found = np.abs(255 * render(scene).image - seen.color).reshape(-1, 3)[pixel]
     # The ray caster does not round the corners of a cut to 1/256 pixel, a shift of half of that.
     assert (found.max(axis=1) < 255 * steps[raster.span[which]] / 512).all()
+
+
+@pytest.mark.parametrize("projection", ["perspective", "orthographic"])
+@pytest.mark.parametrize("filter", ["nearest", "bilinear", "none"])
+def test_cutoff(projection, filter):
+    """A plate with holes before a whole plate of other colours: holes show the plate behind."""
+    rng = np.random.default_rng(9)
+    plate = np.array([[-1.0, -1, 0], [1, -1, 0.4], [1, 1, 0], [-1, 1, -0.3]])
+    points = np.concatenate([plate, 0.9 * plate - (0, 0, 0.8)])
+    faces = np.array([[0, 1, 2], [0, 2, 3], [4, 5, 6], [4, 6, 7]])
+    normals = np.tile([0.0, 0, 1], (8, 1))
+    alpha = np.array({"nearest": [], "bilinear": [1, 0.9, 0.8, 1] * 2, "none": [1, 0.1, 0.2, 1] * 2}[filter])
+    places = np.tile([[0.0, 1], [1.5, 1], [1.5, -0.5], [0, -0.5]], (2, 1))
+    material = Material(*COEFFICIENTS, 20, cutoff=0.5)
+    paint = Paint(faces, rng.random((8, 3)), places, alpha=alpha if alpha.size else None, cut=(0, 1))
+    if filter != "none":
+        checker = np.indices((4, 4)).sum(axis=0) % 2 * 1.0
+        image = Texture(np.ones((4, 4, 3)), ("mirror", "repeat"), filter, False, checker)
+        material = replace(material, texture=image)
+        paint.opacity, paint.order = checker, int(filter == "bilinear")
+        paint.wrap = WORDS["mirror"], WORDS["repeat"]
+    mesh = Mesh(points, faces, normals, [0, 0, 1, 1], paint.colors, places, alpha)
+    camera = Camera.framing(points, (0.2, 0.3, 1), projection=projection)
+    scene = Scene(mesh, camera, *SIZE, (material, replace(material, cutoff=None)), (Light(LIGHT),))
+    given = points, faces, normals, view_of(scene), LIGHT, COEFFICIENTS, 20, "blinn"
+    seen = cast(*given, steps=256, paint=paint)
+    assert errors(scene, seen).max() < 1e-7
+
+    raster = rasterise(scene)
+    whole = rasterise(replace(scene, material=(replace(material, cutoff=None),) * 2))
+    front = raster.visible & (raster.triangle[raster.span] < 2)
+    # The plate in front hides nothing of itself.
+    covered = int((whole.triangle[whole.span] < 2).sum())
+    assert raster.dropped == covered - front.sum()
+    assert 0.2 < raster.dropped / covered < 0.8
