@@ -188,6 +188,8 @@ def _fitted(design: ShadingPipeline, scene: Scene, settings: Settings) -> Shadin
     if scene.has_albedo and settings["geometry"] == "hardware":
         reason = "hardware geometry draws no vertex colours and no textures"
         raise settings.refuse("geometry", reason, "use software")
+    if scene.cutoffs and settings["geometry"] == "hardware":
+        raise settings.refuse("geometry", "hardware geometry drops no pixels by alpha", "use software")
     try:
         fitted = design_for(design, scene, settings["geometry"] == "software")
     except ValueError as error:

@@ -123,8 +123,8 @@ def load(
     local : bool
         Whether lights of a file may have positions.
     albedo : bool
-        Whether pixels may have vertex colours and textures. If not, the mesh lacks them, and ``ignored``
-        names them.
+        Whether there may be vertex colours, textures and cutoffs of alpha. If not, the mesh lacks them, and
+        ``ignored`` names them.
 
     Raises
     ------
@@ -170,21 +170,24 @@ def _sees(camera: Camera, mesh: Mesh, size: tuple[int, int]) -> bool:
 
 
 def _without_albedo(loaded: LoadedMesh) -> LoadedMesh:
-    """The mesh without vertex colours and textures; ``ignored`` names them."""
+    """The mesh without vertex colours, textures and cutoffs of alpha; ``ignored`` names them."""
     materials, mesh = loaded.materials, loaded.mesh
     told = ["vertex colours"] if len(mesh.colors) else []
     textures = len({id(material.texture) for material in materials if material.texture is not None})
     told += [f"{textures} texture{'s' * (textures > 1)}"] if textures else []
-    if not any(material.has_albedo for material in materials):
+    cut = sum(material.cutoff is not None for material in materials)
+    told += [f"{cut} cutoff{'s' * (cut > 1)} of alpha"] if cut else []
+    if not any(material.has_albedo or material.cutoff is not None for material in materials):
         return loaded
     loaded = replace(
         loaded,
-        mesh=replace(mesh, colors=np.zeros((0, 3)), coordinates=np.zeros((0, 2))),
+        mesh=replace(mesh, colors=np.zeros((0, 3)), coordinates=np.zeros((0, 2)), alpha=np.zeros(0)),
         ignored=(*loaded.ignored, *told),
     )
+    plain = {"texture": None, "colored": False, "alpha": 1.0, "cutoff": None}
     return merged(
         loaded,
-        {number: replace(material, texture=None, colored=False) for number, material in enumerate(materials)},
+        {number: replace(material, **plain) for number, material in enumerate(materials)},
     )
 
 

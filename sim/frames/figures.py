@@ -55,6 +55,7 @@ def frame_figures(
             "uncovered_triangles": raster.uncovered,
             "repaired_span_normals": raster.repaired_normals,
             "hidden_spans": raster.hidden_spans,
+            "cut_out_pixels": raster.dropped,
             "cut_spans": frame.prepared.spans_cut,
             "missed_spans": frame.prepared.missed_spans,
             "out_of_range_spans": frame.out_of_range_spans,

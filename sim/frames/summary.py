@@ -23,6 +23,7 @@ _COUNTS = {
     "sliver_triangles": COUNTER_TEXTS["sliver"],
     "far_triangles": "triangles beyond 1,000 times the nearest W, where surfaces 0.1 % apart may swap",
     "hidden_spans": "spans that are wholly hidden, left out",
+    "cut_out_pixels": "pixels dropped before the depth test, as their alpha is under the cutoff",
     "hidden_pixels": "pixels shaded behind earlier pixels",
     "dropped_pixels": COUNTER_TEXTS["dropped"],
     "cut_spans": "spans cut to the range of the method",
@@ -103,6 +104,8 @@ def short_lines(figures: Mapping[str, Any]) -> Iterator[str]:
     yield _line("hardware", f"{geometry}{model}; {figures['engine']}")
     rate = f", {figures['cycles_per_pixel']:.3f} a pixel" if figures["pixels"] else ""
     hidden = f", {figures['visible_pixels']:,} visible" if geometry else ""
+    cut_out = figures["counts"].get("cut_out_pixels")
+    hidden += f"; {cut_out:,} pixel{'s' * (cut_out != 1)} dropped by alpha" if cut_out else ""
     yield _line("cycles", f"{figures['cycles']:,} for {figures['pixels']:,} shaded pixels{rate}{hidden}")
     if figures["visible_pixels"]:
         total, method = (figures[f"{name}_error"]["steady_lsb"] for name in ("total", "method"))

@@ -223,8 +223,12 @@ def _gltf_material(
         made = FileMaterial.of_metallic_roughness(given_name, color, *factors, two_sided)
     info = color_texture(text)
     _tell_look(text, look, info, alpha, found)
+    mode = text.get("alphaMode", "OPAQUE")
     if info is not None:
-        made = replace(made, texture=textures.read(info, text.get("alphaMode", "OPAQUE") == "OPAQUE"))
+        of_alpha = {"OPAQUE": "left out", "MASK": "read"}.get(str(mode), "told")
+        made = replace(made, texture=textures.read(info, of_alpha))
+    if mode == "MASK":
+        made = replace(made, alpha=float(alpha), cutoff=_cutoff(text, alpha, key, name))
     if "emissiveTexture" not in text and not unlit:
         made = replace(made, emission=_emission(text, name))
     return made
@@ -240,6 +244,18 @@ def _are_numbers(given: Any, count: int) -> bool:
     """Whether a value is a list of ``count`` numbers."""
     kinds = [type(number) in (int, float) for number in given] if isinstance(given, list) else []
     return len(kinds) == count and all(kinds)
+
+
+def _cutoff(text: dict, alpha: float, key: str, name: str) -> float:
+    """Least alpha of a material that is drawn; `Refused` if it or the alpha of a factor is out of range."""
+    cutoff = text.get("alphaCutoff", 0.5)
+    for what, value, most in (("alphaCutoff", cutoff, 1e30), (f"alpha of {key}", alpha, 1)):
+        if not _are_numbers([value], 1) or not 0 <= value <= most:
+            wanted = "from 0" if what == "alphaCutoff" else "from 0 to 1"
+            raise Refused(
+                f"material {name!r} has the {what} {shown(str(value))!r}, not a number {wanted}", ONE_MATERIAL
+            )
+    return float(cutoff)
 
 
 def _emission(text: dict, name: str) -> Triple | None:
@@ -269,10 +285,8 @@ def _tell_look(text: dict, look: dict, info: dict | None, alpha: float, found: F
         key for part in _parts(text) for key in part if key.endswith("Texture") and part[key] is not info
     )
     found.tell_names("textures", textures)
-    mode, cutoff = text.get("alphaMode", "OPAQUE"), text.get("alphaCutoff", 0.5)
-    least = 1.0 if mode == "BLEND" else cutoff
-    kind = "of materials"
-    if mode != "OPAQUE" and (not isinstance(least, int | float) or alpha < least):
+    mode, kind = text.get("alphaMode", "OPAQUE"), "of materials"
+    if mode not in ("OPAQUE", "MASK") and alpha < 1:
         found.tell_names(kind, [f"alpha (alphaMode {mode})"])
     found.tell_names(kind, extensions, _SILENT | _READ)
     found.tell_names(kind, text, _KNOWN["materials"] | _ANY)

@@ -267,7 +267,8 @@ def plain_arrays(
         Bytes of the new document's only buffer.
     looks : list of dict
         A dict for each primitive. ``"material"`` is the number of its material from 1, or 0 for none.
-        ``"colors"`` and ``"coordinates"`` are float64 arrays of its vertices, or ``None``.
+        ``"colors"`` and ``"coordinates"`` are float64 arrays of its vertices, or ``None``. Colours have a
+        fourth column, alpha, if the file has alpha and the material has a cutoff.
     """
     arrays = _Arrays(document, buffers)
     looks: list[dict[str, Any]] = []
@@ -364,9 +365,10 @@ def _looks(
     colors, coordinates = values.get("COLOR_0"), values.get(names[-1])
     if colors is not None:
         mode = material.get("alphaMode", "OPAQUE")
-        if mode != "OPAQUE" and (colors[:, 3:] < 1).any():
-            found.tell_names("of materials", [f"alpha (alphaMode {mode})"])
-        colors = colors[:, :3]
+        if mode != "MASK":
+            if mode != "OPAQUE" and (colors[:, 3:] < 1).any():
+                found.tell_names("of materials", [f"alpha (alphaMode {mode})"])
+            colors = colors[:, :3]
     if info is None or coordinates is None:
         return colors, None
     return colors, texture_coordinates(info, coordinates)

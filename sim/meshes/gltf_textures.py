@@ -138,15 +138,15 @@ class GltfTextures:
         self._folder, self._found = folder, found
         self._made: dict[tuple[Any, ...], Texture | None] = {}
 
-    def read(self, info: dict, opaque: bool) -> Texture | None:
+    def read(self, info: dict, alpha: str) -> Texture | None:
         """The texture to which a part of a material refers. ``None`` if its image is missing.
 
         Parameters
         ----------
         info : dict
             From `color_texture`.
-        opaque : bool
-            Whether the material has no alpha.
+        alpha : str
+            As for `load_texture`.
 
         Raises
         ------
@@ -166,9 +166,10 @@ class GltfTextures:
         if "sampler" in texture:
             sampler = self._part("samplers", texture["sampler"], "a texture with the sampler")
         options = self._options(sampler)
-        key = (str(image), *options.values(), opaque)
+        options["alpha"] = alpha
+        key = (str(image), *options.values())
         if key not in self._made:
-            self._made[key] = self._texture(image, options, opaque)
+            self._made[key] = self._texture(image, options)
         return self._made[key]
 
     def _part(self, name: str, number: Any, what: str) -> dict:
@@ -188,7 +189,7 @@ class GltfTextures:
         wrap = _chosen(sampler, "wrapS", _WRAPS, 10497), _chosen(sampler, "wrapT", _WRAPS, 10497)
         return {"wrap": wrap, "filter": filter, "mipmapped": mipmapped}
 
-    def _texture(self, number: Any, options: dict[str, Any], opaque: bool) -> Texture | None:
+    def _texture(self, number: Any, options: dict[str, Any]) -> Texture | None:
         """The texture of an image."""
         image = self._part("images", number, "a texture with the image")
         uri, name = image.get("uri"), image.get("name")
@@ -206,9 +207,9 @@ class GltfTextures:
             target = self._target(uri)
             if target is None:
                 return None
-            return read_texture(target, self._found, name or None, opaque=opaque, **options)
+            return read_texture(target, self._found, name or None, **options)
         name = name if isinstance(name, str) and name else f"number {number}"
-        return load_texture(data, name, self._found, opaque=opaque, **options)
+        return load_texture(data, name, self._found, **options)
 
     def _target(self, uri: str) -> Path | None:
         """The file of an image. ``None`` if the file is missing or outside the folder, which is recorded."""

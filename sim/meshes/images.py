@@ -36,15 +36,15 @@ def load_texture(
     wrap: tuple[str, str] = ("repeat", "repeat"),
     filter: str = "bilinear",
     mipmapped: bool = True,
-    opaque: bool = False,
+    alpha: str = "told",
 ) -> Texture:
     """Texture of an image: PNG, JPEG, WebP, BMP or TGA.
 
     Codes of 8 bits are decoded by the curve of sRGB. Colour profiles and orientations (EXIF) are not read.
 
     A side that is no power of two, or over `LARGEST_TEXTURE`, is resampled in linear light. Its new size is
-    the power of two with the nearest logarithm. The sizes of resampled images, alpha, and frames after the
-    first are recorded as not read.
+    the power of two with the nearest logarithm. The sizes of resampled images, and frames after the first are
+    recorded as not read.
 
     Parameters
     ----------
@@ -57,8 +57,9 @@ def load_texture(
     wrap, filter, mipmapped
         See `Texture`. The texels that a resampled border needs follow from ``wrap``. An image for ``nearest``
         is enlarged without mixing the colours of neighbours.
-    opaque : bool
-        Whether the material has no use for alpha. Then alpha is not recorded.
+    alpha : {"told", "left out", "read"}
+        Whether alpha is recorded as not read, is not recorded, or is read. It is linear, and resampled as a
+        colour is.
 
     Raises
     ------
@@ -74,19 +75,21 @@ def load_texture(
         raise Refused(f"{what} is empty", _REMEDY)
     image, unread = _decoded(data, what)
     for kind in unread:
-        if not (kind == "alpha" and opaque):
+        if kind != "alpha" or alpha == "told":
             found.tell_names(f"{kind} of images", [name])
     size = tuple(min(1 << round(float(np.log2(side))), LARGEST_TEXTURE) for side in image.size)
-    light = decode(np.arange(256) / 255)
+    curves = dict.fromkeys("RGB", decode(np.arange(256) / 255))
+    if alpha == "read" and "alpha" in unread:
+        curves["A"] = np.arange(256) / 255
+    channels = {c: np.asarray(image.getchannel(c)) for c in curves}
     if image.size == size:
-        texels = light[np.asarray(image)]
+        planes = {c: curves[c][codes] for c, codes in channels.items()}
     else:
-        texels = np.stack(
-            [_resampled(np.asarray(image.getchannel(c)), light, size, wrap, filter) for c in "RGB"], axis=-1
-        )
+        planes = {c: _resampled(codes, curves[c], size, wrap, filter) for c, codes in channels.items()}
         of, to = (f"{width} x {height}" for width, height in (image.size, size))
         found.tell_names("sizes of images", [f"{of} (resampled to {to}) of {name}"])
-    return Texture(texels, wrap, filter, mipmapped)
+    texels = np.stack([planes[c] for c in "RGB"], axis=-1)
+    return Texture(texels, wrap, filter, mipmapped, planes.get("A", np.zeros((0, 0))))
 
 
 def find_image(name: str, folder: Path, beside: Path | None = None) -> tuple[Path | None, str]:
@@ -135,7 +138,7 @@ def read_texture(path: Path, found: Found, name: str | None = None, **options: A
 
 
 def _decoded(data: bytes, what: str) -> tuple[Image.Image, list[str]]:
-    """The image as RGB, and the contents that are not read. The user does not see Pillow's warnings."""
+    """The image as RGB or RGBA, and the contents that are not read. The user sees no warnings of Pillow."""
     unread = []
     kinds = ", ".join(_FORMATS)
     many = Refused(f"{what} has over {MAX_PIXELS:,} pixels", _REMEDY)
@@ -158,11 +161,12 @@ def _decoded(data: bytes, what: str) -> tuple[Image.Image, list[str]]:
             image = Image.open(io.BytesIO(data), formats=_FORMATS)
             if getattr(image, "n_frames", 1) > 1:
                 unread.append("frames after the first")
-            if image.has_transparency_data:
-                image = image.convert("RGBA")
-                if image.getchannel("A").getextrema()[0] < 255:
-                    unread.append("alpha")
-            return image.convert("RGB"), unread
+            if not image.has_transparency_data:
+                return image.convert("RGB"), unread
+            image = image.convert("RGBA")
+            if image.getchannel("A").getextrema()[0] < 255:
+                unread.append("alpha")
+            return image, unread
         except Refused:
             raise
         except (Image.DecompressionBombWarning, Image.DecompressionBombError):

@@ -78,8 +78,8 @@ def assembled(
     """All triangles of a scene in world coordinates, as one mesh.
 
     If the scene is ``painted``, a part's metadata have the number of its ``"material"``. They may have
-    ``"colors"``, a float64 array of shape (V, 3), linear, and ``"coordinates"``, a float64 array of shape (V,
-    2), with v from the top of the image.
+    ``"colors"``, a float64 array of shape (V, 3), linear, or (V, 4) with alpha. They may have
+    ``"coordinates"``, a float64 array of shape (V, 2), with v from the top of the image.
     """
     import trimesh
 
@@ -133,7 +133,7 @@ def assembled(
         np.concatenate(material),
         np.concatenate([stored for stored, _ in normals]),
         np.concatenate([flag for _, flag in normals]),
-        _joined(colors, vertices, np.ones((1, 3))),
+        _joined(colors, vertices, np.ones((1, 4))),
         _joined(coordinates, vertices, np.zeros((1, 2))),
         path.stem,
         lost,
@@ -143,18 +143,19 @@ def assembled(
 
 
 def _colors(given: np.ndarray | None, faces: np.ndarray, found: Found) -> np.ndarray | None:
-    """Colours of a part's vertices, 0 to 1. Colours over 1 are limited and recorded."""
+    """Colours and alpha of a part's vertices, 0 to 1, shape (V, 4). Values over 1 are cut and recorded."""
     if given is None:
         return None
     used = np.unique(faces)
     seen = given[used]
     if wrong := np.flatnonzero(~(np.isfinite(seen) & (seen >= -_ROUNDED)).all(axis=1)).tolist():
         text = " ".join(f"{channel:g}" for channel in seen[wrong[0]].tolist())
-        raise Refused(f"a vertex has the colour {text!r}, not three numbers from 0", ONE_MATERIAL)
+        many = "three" if given.shape[1] == 3 else "four"
+        raise Refused(f"a vertex has the colour {text!r}, not {many} numbers from 0", ONE_MATERIAL)
     over = int((seen > 1 + _ROUNDED).any(axis=1).sum())
     found.tell("vertex colour's part over 1", "vertex colours' parts over 1", over)
-    result = np.ones(given.shape)
-    result[used] = np.clip(seen, 0, 1)
+    result = np.ones((len(given), 4))
+    result[used, : given.shape[1]] = np.clip(seen, 0, 1)
     return result
 
 
@@ -219,6 +220,11 @@ def _with_materials(loaded: LoadedMesh, found: Found) -> LoadedMesh:
         if material.texture is not None and not kind & 1:
             found.tell("texture of a part without coordinates", "textures of parts without coordinates")
             material = replace(material, texture=None)
+        transparent = len(loaded.mesh.alpha) > 0 and kind & 2 > 0
+        if material.texture is not None:
+            transparent |= material.texture.alpha.size > 0
+        if material.cutoff is not None and not transparent and material.alpha >= material.cutoff:
+            material = replace(material, alpha=1.0, cutoff=None)
         if material.has_albedo and 0 < (material.metallic or 0.0) < 1:
             found.tell("the exact highlights of colours that are partly metallic")
         materials[kind] = material
@@ -226,6 +232,8 @@ def _with_materials(loaded: LoadedMesh, found: Found) -> LoadedMesh:
     mesh = loaded.mesh
     if all(material.texture is None for material in loaded.materials):
         mesh = replace(mesh, coordinates=mesh.coordinates[:0])
+    if all(material.cutoff is None for material in loaded.materials):
+        mesh = replace(mesh, alpha=mesh.alpha[:0])
     return replace(loaded, mesh=mesh, ignored=found.ignored)
 
 
@@ -307,8 +315,9 @@ def finished(
         faces=np.concatenate([renumbered, smooth_faces + len(own)]).astype(np.int64),
         normals=np.concatenate([own_normals, smooth_normals]),
         material=np.concatenate([material[kept], material[~kept]]).astype(np.int64),
-        colors=colors[kept_vertices] if len(colors) else colors,
+        colors=colors[kept_vertices, :3] if (colors[:, :3] != 1).any() else colors[:0, :3],
         coordinates=coordinates[kept_vertices] if len(coordinates) else coordinates,
+        alpha=colors[kept_vertices, 3] if (colors[:, 3] != 1).any() else colors[:0, 3],
     )
     opposed = (np.einsum("fki,fi->fk", own_normals[renumbered], directions[kept]) < 0).all(axis=1).sum()
     return LoadedMesh(mesh, name, repaired + lost, dropped, int(opposed))

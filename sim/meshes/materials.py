@@ -49,6 +49,10 @@ class FileMaterial:
         Metallic factor, 0 to 1. The other values already have its effect on a surface of a single colour.
     colored : bool
         Whether colours of the vertices multiply the diffuse colour.
+    alpha : float
+        Alpha of the surface, 0 to 1.
+    cutoff : float or None
+        Least alpha that is drawn, see `Material`.
     """
 
     name: str = ""
@@ -64,6 +68,8 @@ class FileMaterial:
     unlit: bool = False
     metallic: float | None = None
     colored: bool = False
+    alpha: float = 1.0
+    cutoff: float | None = None
 
     @classmethod
     def of_metallic_roughness(
@@ -182,7 +188,9 @@ def surfaces(
             said["ambient"] = tuple(_AMBIENT_SHARE * channel for channel in said["diffuse"])
         hidden = {*fixed, *(other for name, other in _INSTEAD if name in fixed)}
         said = {name: value for name, value in said.items() if value is not None and name not in hidden}
-        looks = {name: getattr(material, name) for name in ("two_sided", "texture", "unlit")}
+        looks = {
+            name: getattr(material, name) for name in ("two_sided", "texture", "unlit", "alpha", "cutoff")
+        }
         looks["tinted"] = material.has_albedo and (material.metallic or 0.0) >= _TINTED
         if material.emission is not None:
             looks["emission"] = tuple(min(channel, 1.0) for channel in material.emission)

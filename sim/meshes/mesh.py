@@ -83,7 +83,7 @@ def load_mesh(
 
     *Materials.* Of a GLB or glTF file these are read:
 
-    - the base colour without its alpha, metallic and roughness factors of ``pbrMetallicRoughness``, each 1 if
+    - the base colour, metallic and roughness factors of ``pbrMetallicRoughness``, each 1 if
       missing (see `Material.of_metallic_roughness`);
     - the factors of KHR_materials_pbrSpecularGlossiness, which replace them (see
       `Material.of_specular_glossiness`);
@@ -91,7 +91,9 @@ def load_mesh(
     - KHR_materials_unlit and ``doubleSided``;
     - the texture of the colour, see `load_texture`: its sampler, its set of coordinates,
       KHR_texture_transform, and its image in the buffer, in the text or in a file of the folder;
-    - colours of vertices, COLOR_0, without alpha.
+    - colours of vertices, COLOR_0;
+    - with ``alphaMode`` MASK the ``alphaCutoff`` (0.5 if missing), and alpha of the factor, of the texture
+      and of COLOR_0. Pixels under the cutoff are dropped before the depth test. Alpha of other modes is told.
 
     A sampler's filter for enlarging also serves for reducing. Levels are chosen, not blended.
 
@@ -268,7 +270,7 @@ def _of_arrays(source: Sequence[ArrayLike], crease_angle: float) -> LoadedMesh:
         raise Refused(f"there are {len(normals)} normals for {len(vertices)} vertices", GIVE_ARRAYS)
     flags = np.full(len(vertices), "normals" in arrays)
     material = np.zeros(len(faces), dtype=np.int64)
-    none = np.zeros((0, 3)), np.zeros((0, 2))
+    none = np.zeros((0, 4)), np.zeros((0, 2))
     return finished(vertices, faces, material, normals, flags, *none, "arrays", 0, crease_angle)
 
 

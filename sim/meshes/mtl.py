@@ -35,6 +35,7 @@ _UNREAD = {
     "aniso": ("anisotropy", 0),
     "illum": ("", 2),
 }
+_ALPHA_MAPS = ("map_d", "map_Tr")
 # Largest material file in bytes; 100,000 materials take less.
 _MAX_LIBRARY = 16_000_000
 _IMAGE = re.compile(
@@ -206,6 +207,7 @@ def _mtl_material(text: str, name: str, texture: Callable[[], Texture | None], f
             (maps if is_map else values)[keyword.lower() if is_map else keyword] = words
     # Texels of map_Kd multiply ambient light, too. So map_Ka with the same image counts as read.
     drawn = maps.pop("map_kd", None)
+    found.tell_names("of materials", (f"alpha ({key})" for key in _ALPHA_MAPS if maps.pop(key.lower(), None)))
     others = [words for keyword, words in maps.items() if keyword != "map_ka" or words != drawn]
     found.tell("texture", "textures", len(others))
     found.tell_names("of materials", _unread(values))

@@ -95,6 +95,14 @@ def test_what_the_error_leaves_out_is_told(lines):
     assert not any(text.startswith("left out") for text in told)
 
 
+def test_pixels_dropped_by_alpha_are_told():
+    given = {**figures("blinn", "blinn"), "counts": {"cut_out_pixels": 1234}}
+    assert line(list(short_lines(given)), "cycles").endswith("; 1,234 pixels dropped by alpha")
+    reason = "pixels dropped before the depth test, as their alpha is under the cutoff"
+    assert line(list(frame_lines(given)), "counted") == f"{reason}: 1,234"
+    assert not any("dropped" in text for text in short_lines(figures("blinn", "blinn")))
+
+
 def test_a_warning_has_number_reason_and_remedy():
     given = {**figures("blinn", "blinn"), "counts": {"missed_pieces": 1234, "sliver_triangles": 5}}
     noticed = [line for line in short_lines(given) if line.startswith("noticed")]

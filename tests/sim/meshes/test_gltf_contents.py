@@ -199,7 +199,7 @@ MATERIAL_TOLD = [
     (base(1, 0, 0, 0.5, alphaMode="BLEND"), "alpha (alphaMode BLEND)"),
     (base(1, 0, 0, 1, alphaMode="BLEND"), ()),
     (base(1, 0, 0, 0.6, alphaMode="MASK"), ()),
-    (base(1, 0, 0, 0.6, alphaMode="MASK", alphaCutoff=0.7), "alpha (alphaMode MASK)"),
+    (base(1, 0, 0, 0.6, alphaMode="MASK", alphaCutoff=0.7), ()),
     (base(1, 0, 0, 1, emissiveFactor=[0, 0, 0]), ()),
     (base(1, 0, 0, 1, emissiveFactor=[1, 0, 0]), ()),
     (base(1, 0, 0, 1, **extended("KHR_materials_unlit")), ()),

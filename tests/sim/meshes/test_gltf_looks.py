@@ -47,7 +47,55 @@ def test_alpha_of_vertices_is_told_where_it_counts(tmp_path):
     for mode, told in (("OPAQUE", ()), ("BLEND", ("of materials: alpha (alphaMode BLEND)",))):
         content = material_gltf([base(1, 1, 1, 1, alphaMode=mode)], [0])
         content = with_array(content, "COLOR_0", [[1, 0, 0, 1]] * 2 + [[1, 0, 0, 0.5]])
-        assert load(tmp_path / "a.glb", content).ignored == told
+        loaded = load(tmp_path / "a.glb", content)
+        assert (loaded.ignored, loaded.mesh.alpha.size) == (told, 0)
+
+
+@pytest.mark.parametrize(("kind", "scale"), [("f4", 1), ("u1", 255), ("u2", 65535)])
+def test_alpha_of_vertices_is_read_for_a_cutoff(tmp_path, kind, scale):
+    """White is no colour, and its alpha counts all the same."""
+    for color, colors in (([1, 0, 0], 3), ([1, 1, 1], 0)):
+        content = material_gltf([base(1, 1, 1, 0.9, alphaMode="MASK", alphaCutoff=0.25)], [0])
+        values = np.array([[*color, 1], [*color, 0.2], [*color, 0.4]]) * scale
+        content = with_array(content, "COLOR_0", values, kind, normalized=kind != "f4")
+        loaded = load(tmp_path / "a.glb", content)
+        (material,) = loaded.materials
+        assert (loaded.ignored, material.alpha, material.cutoff) == ((), 0.9, 0.25)
+        np.testing.assert_allclose(
+            at_vertices(loaded, loaded.mesh.alpha[:, None]), [[1], [0.2], [0.4]], atol=1e-7
+        )
+        assert len(loaded.mesh.colors) == colors
+
+
+def test_a_cutoff_that_drops_nothing_is_left_out(tmp_path):
+    content = material_gltf([base(1, 1, 1, 0.6, alphaMode="MASK")], [0])
+    (material,) = load(tmp_path / "a.glb", content).materials
+    assert (material.alpha, material.cutoff) == (1, None)
+    content = material_gltf([base(1, 1, 1, 0.4, alphaMode="MASK")], [0])
+    assert load(tmp_path / "a.glb", content).materials[0].cutoff == 0.5
+
+
+@pytest.mark.parametrize(
+    ("material", "reason"),
+    [
+        (base(1, 1, 1, 1, alphaMode="MASK", alphaCutoff=-0.1), "the alphaCutoff '-0.1', not a number from 0"),
+        (base(1, 1, 1, 1, alphaMode="MASK", alphaCutoff="a"), "the alphaCutoff 'a', not a number from 0"),
+        (base(1, 1, 1, 1, alphaMode="MASK", alphaCutoff=math.nan), "the alphaCutoff 'nan', not a number"),
+        (
+            base(1, 1, 1, 1.5, alphaMode="MASK"),
+            "the alpha of baseColorFactor '1.5', not a number from 0 to 1",
+        ),
+    ],
+)
+def test_bad_cutoffs_are_refused(tmp_path, material, reason):
+    check_refused(tmp_path / "a.glb", reason, content=material_gltf([material], [0]))
+
+
+def test_a_bad_alpha_of_a_vertex_is_refused(tmp_path):
+    content = material_gltf([base(1, 1, 1, 1, alphaMode="MASK")], [0])
+    content = with_array(content, "COLOR_0", [[1, 0, 0, 1]] * 2 + [[1, 0, 0, math.nan]])
+    reason = "a vertex has the colour '1 0 0 nan', not four numbers from 0"
+    check_refused(tmp_path / "a.glb", reason, content=content)
 
 
 def test_colours_over_1_are_told(tmp_path):

@@ -249,7 +249,20 @@ def test_an_image_is_read_once(tmp_path):
 def test_alpha_of_an_image_is_told_where_it_counts(tmp_path, mode):
     image = png([[[255, 0, 0, 255], [0, 255, 0, 9]]])
     loaded = load(tmp_path / "a.glb", textured(image=image, material={"alphaMode": mode}))
-    assert loaded.ignored == (() if mode == "OPAQUE" else ("alpha of images: number 0",))
+    assert loaded.ignored == (("alpha of images: number 0",) if mode == "BLEND" else ())
+    (material,) = loaded.materials
+    assert (material.cutoff, material.alpha) == (0.5 if mode == "MASK" else None, 1)
+    assert material.texture.alpha.tolist() == ([[1, 9 / 255]] if mode == "MASK" else [])
+
+
+def test_alpha_of_an_image_is_resampled_in_its_own_light(tmp_path):
+    """Three columns of alpha become four, as an image of a linear channel by Pillow does."""
+    codes = np.array([[10, 200, 90]])
+    image = png(np.dstack([codes, codes, codes, codes]))
+    loaded = load(tmp_path / "a.glb", textured(image=image, material={"alphaMode": "MASK"}))
+    tiles = Image.fromarray(np.tile(codes / 255, 3).astype(np.float32))
+    expected = np.asarray(tiles.resize((4, 1), Image.Resampling.BILINEAR, (3, 0, 6, 1)))
+    np.testing.assert_allclose(loaded.materials[0].texture.alpha, expected, atol=1e-6)
 
 
 @pytest.mark.parametrize("materials", [True, False])

@@ -83,7 +83,7 @@ def test_each_kind_of_png_is_read(data, expected, told):
 
 
 def test_alpha_that_the_material_leaves_out_is_no_news():
-    assert read(png([[51, 255, 128, 254]], 4), opaque=True)[1] == ()
+    assert read(png([[51, 255, 128, 254]], 4), alpha="left out")[1] == ()
 
 
 @pytest.mark.parametrize("kind", ["BMP", "TGA", "WEBP"])

@@ -64,6 +64,7 @@ MTL_TOLD = {
     "Tr 0.25": "alpha (Tr)",
     "d 1\nTr 1": (),
     "d 0.3\nTr 0.7": "alpha (d)",
+    "map_D a.png\nmap_Tr -s 1 1 b.png": "alpha (map_d), alpha (map_Tr)",
     "Ke 1 0 0": (),
     "Ka 1 1 1": "ambient colour (Ka)",
     "Tf 0.5": "transmission (Tf)",
