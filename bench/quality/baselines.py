@@ -7,7 +7,7 @@ writes the file. If words are given, the command measures only entries whose nam
 other entries stay unchanged. After a unit was added, use
 ``python -m blysk.bench.quality.baselines --update halfway_vector``.
 
-Cycles do not depend on the engine. Here they come from Amaranth's own simulator, which compiles nothing.
+Cycles do not depend on the engine. Amaranth's own simulator would need too long for compact pipelines.
 """
 
 import json

@@ -51,7 +51,7 @@ def cycles_of(design: ShadingPipeline) -> dict[str, int]:
         ``teapot_cycles`` of a teapot of 256 triangles at 48x36, and ``square_cycles`` of a square with bent
         normals at 32x24.
     """
-    simulator = FrameSimulator(design, "pysim")
+    simulator = FrameSimulator(design)
     return {f"{name}_cycles": simulator.render(scene).cycles for name, scene in _scenes().items()}
 
 
