@@ -116,7 +116,7 @@ class ShadingPipelineUnit(wiring.Component):
     ``quotient`` has ``ceil((2 + 2 lights) / 3)`` for its quotients and one for the setup. A pixel takes the
     largest of three numbers of cycles:
 
-    - 3, with one channel, too: the products of a pixel share multipliers;
+    - 3, also with one channel, because the products of a pixel share multipliers;
     - ``channels max(1, T)``, or ``channels (1 + T)`` with an albedo, where T is the number of its diffuse and
       specular terms that are not 0 (see `Intensity.cycles`);
     - one cycle for each product of the specular model (42 for a power), if a light is in front of the surface

@@ -20,9 +20,10 @@ from blysk.hdl.lighting.transfer import TransferUnit
 __all__ = ["COMPACT_INTERVAL", "PixelShading"]
 
 COMPACT_INTERVAL = 3
-"""Cycles in which the products of a pixel share multipliers in the compact style, with one channel, too.
+"""Least cycles of a pixel in the compact style, also with one channel.
 
-The colours of three channels take as many cycles at least."""
+The products of a pixel share multipliers for these cycles. Three channels need at least as many cycles.
+"""
 
 
 class PixelShading:

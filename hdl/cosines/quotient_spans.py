@@ -367,8 +367,7 @@ class QuotientSpansUnit(wiring.Component):
         total = Signal(signed(len(product) + 2), name="total", reset_less=True)
         continues = ~Cat(multiplied.step == last + 1 for last in (-1, *lasts[:-1])).any()
         m.d.sync += total.eq(Mux(continues, total, 0) + product)
-        # The payload stays for the turn of the start, while the last differences are shifted. Second
-        # differences of squares are shifted by twice the exponent.
+        # The payload stays for the turn of the start, while the last differences are shifted.
         twice = multiplied.turn.second & (multiplied.step < len(squares))
         exponent = Mux(multiplied.turn.start, 0, span.exponent)
         amount = register(Mux(twice, Cat(Const(0, 1), exponent), exponent)[:5], "amount")
