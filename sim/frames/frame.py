@@ -25,6 +25,7 @@ from blysk.hdl.pixel_pipelines import WidePipelinesUnit
 from blysk.sim.engines.beats import dtype_of
 from blysk.sim.engines.engine import SimulationError
 from blysk.sim.engines.simulate import Run, simulate
+from blysk.sim.frames.outside_texels import PipelineWithTexels
 
 __all__ = [
     "FrameSimulator",
@@ -58,7 +59,9 @@ _IDLE = 1000
 """Idle timeout of several pipelines: cycles without a beat after which they are done. A pixel takes less."""
 
 
-def beats_of(unit: ShadingPipelineUnit | WidePipelinesUnit, spans: Spans) -> dict[str, np.ndarray]:
+def beats_of(
+    unit: ShadingPipelineUnit | WidePipelinesUnit | PipelineWithTexels, spans: Spans
+) -> dict[str, np.ndarray]:
     """Input beats of a pipeline, as `simulate` takes them.
 
     Parameters
@@ -129,7 +132,7 @@ class FrameSimulator:
     ----------
     design : ShadingPipeline
         The pipeline: method, reflection model, number of lights and so on. Its `Build` has the number of
-        pipelines.
+        pipelines. Texels outside of the pipeline are in a test memory, see `PipelineWithTexels`.
     engine : str
         ``"auto"``, ``"cxxrtl"`` or ``"pysim"``, see `simulate`.
 
@@ -153,9 +156,7 @@ class FrameSimulator:
         self.design = design
         self.engine = engine
         self._pipes = design.build.pipes
-        self._unit = (
-            ShadingPipelineUnit(design) if self._pipes == 1 else WidePipelinesUnit(PixelPipelines(design))
-        )
+        self._unit = _unit_of(design)
         spans, constants = _sample(design)
         expected = design.compute(spans, constants)
         run, beats = self._run(spans, constants, expected.y)
@@ -228,6 +229,12 @@ class FrameSimulator:
             cycles=run.total_cycles,
             engine=run.engine,
         )
+
+
+def _unit_of(design: ShadingPipeline) -> ShadingPipelineUnit | WidePipelinesUnit | PipelineWithTexels:
+    if design.build.pipes > 1:
+        return WidePipelinesUnit(PixelPipelines(design))
+    return PipelineWithTexels(design) if design.texels_outside else ShadingPipelineUnit(design)
 
 
 def _colors(beats: np.ndarray) -> np.ndarray:

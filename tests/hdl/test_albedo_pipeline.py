@@ -7,8 +7,6 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from amaranth.back import rtlil
-from amaranth.hdl import Module, Signal
-from amaranth.lib import wiring
 
 from blysk.bench.units.pipeline import RECORD, case_of
 from blysk.bench.units.pipeline_spans import any_constants, any_spans
@@ -16,13 +14,11 @@ from blysk.bench.units.record import UnitRun
 from blysk.golden.albedo.texel_memory import TexelMemory
 from blysk.golden.albedo.texture_sampler import TextureSampler
 from blysk.golden.build import BuildError
-from blysk.golden.frame_constants import TEXELS_ADDRESS
 from blysk.golden.presets import preset
 from blysk.golden.render import Renderer
-from blysk.hdl.albedo.texel_memory import TexelMemoryUnit
-from blysk.hdl.core.stream import connect, connect_fifo
 from blysk.hdl.pipeline import ShadingPipelineUnit
 from blysk.sim.engines.simulate import simulate
+from blysk.sim.frames.outside_texels import PipelineWithTexels
 
 from ..checks import assert_equals_model
 
@@ -43,44 +39,13 @@ def test_equals_model(variant):
     assert_equals_model(unit, UnitRun(case, RECORD.expect(unit, case), None, stalls), "pysim")
 
 
-class OutsideTexels(wiring.Component):
-    """A pipeline, and outside of it a memory of texels, which the same writes load, with late answers."""
-
-    def __init__(self, design):
-        memory = TexelMemory(104, external=True)
-        albedo = replace(design.albedo, texture=TextureSampler(memory))
-        self.model = replace(design, albedo=albedo)
-        self.pipeline, self.memory = ShadingPipelineUnit(self.model), TexelMemoryUnit(memory)
-        members = dict(self.pipeline.signature.members)
-        del members["texel_request"], members["texel_response"]
-        super().__init__(members)
-
-    def elaborate(self, platform):
-        m = Module()
-        m.submodules.pipeline, m.submodules.memory = pipeline, memory = self.pipeline, self.memory
-        connect(m, wiring.flipped(self.i), pipeline.i)
-        connect(m, wiring.flipped(self.write), pipeline.write)
-        connect(m, pipeline.o, wiring.flipped(self.o))
-        address, late = self.write.payload.address, Signal(3)
-        m.d.sync += late.eq(late + 1)
-        connect_fifo(m, "requests", pipeline.texel_request, memory.i, 8)
-        m.d.comb += [
-            self.status.eq(pipeline.status),
-            memory.write.valid.eq(self.write.valid & self.write.ready & (address >= 14) & (address <= 15)),
-            memory.write.payload.begins.eq(address == TEXELS_ADDRESS),
-            memory.write.payload.value.eq(self.write.payload.data),
-            pipeline.texel_response.payload.eq(memory.o.payload),
-            pipeline.texel_response.valid.eq(memory.o.valid & late.any()),
-            memory.o.ready.eq(pipeline.texel_response.ready & late.any()),
-        ]
-        return m
-
-
 @pytest.mark.long
 def test_texels_outside():
-    """Answers come after many cycles, at times not: the same pixels."""
+    """Answers come after random numbers of cycles: the same pixels."""
     design = RECORD.variants["albedo, both, without lights, 2 materials"].unit().model
-    unit, rng = OutsideTexels(design), np.random.default_rng(2)
+    texture = TextureSampler(TexelMemory(104, external=True))
+    unit = PipelineWithTexels(replace(design, albedo=replace(design.albedo, texture=texture)))
+    rng = np.random.default_rng(2)
     case = RECORD.stimuli["spans"].make(unit, rng, 120)
     assert_equals_model(unit, UnitRun(case, RECORD.expect(unit, case), None, {}), "pysim")
 

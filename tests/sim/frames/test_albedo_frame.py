@@ -7,9 +7,11 @@ import pytest
 
 import blysk
 from blysk.golden.albedo.albedo import Albedo
+from blysk.golden.albedo.texel_memory import TexelMemory
 from blysk.golden.albedo.texture_sampler import TextureSampler
-from blysk.golden.frames.frame import frame_buffer
+from blysk.golden.frames.frame import frame_buffer, model_frame
 from blysk.golden.frames.prepare import prepare
+from blysk.golden.frames.surface import design_for
 from blysk.golden.reference.camera import Camera
 from blysk.golden.reference.geometry import Mesh, normalise
 from blysk.golden.reference.light import Light
@@ -59,6 +61,25 @@ def test_colours_times_texels(engine, size):
     np.testing.assert_array_equal(frame.image, expected)
     error = np.abs(expected - 255 * render(scene).image)
     assert 0.45 < error.max() < 0.55
+
+
+@pytest.mark.long
+def test_texels_outside_and_holes():
+    """Texels come after random numbers of cycles, and alpha makes holes: the frame of texels inside."""
+    scene = scene_of((24, 18))
+    alpha = np.indices((8, 8)).sum(axis=0) % 2
+    texture = replace(scene.material.texture, alpha=alpha, filter="nearest", mipmapped=False)
+    scene = replace(scene, material=replace(scene.material, texture=texture, cutoff=0.5))
+    inside = design_for(blysk.design(), scene)
+    sampler = replace(inside.albedo.texture, memory=TexelMemory(inside.albedo.texture.memory.depth, True))
+    outside = replace(inside, albedo=replace(inside.albedo, texture=sampler))
+    frame, expected = blysk.render(scene, design=outside, engine="pysim"), model_frame(scene, inside)
+    np.testing.assert_array_equal(frame.image, expected.image)
+    dropped = expected.raster.dropped
+    assert frame.figures["counts"]["cut_out_pixels"] == dropped > 20
+    assert f"their alpha is under the cutoff: {dropped}" in str(frame)
+    # Four cycles a texel on average, in place of a single cycle.
+    assert frame.figures["cycles_per_pixel"] > 3
 
 
 @pytest.mark.long
