@@ -47,8 +47,8 @@ class ShadingPipeline:
     materials : int
         Number of materials, 1 to `frame_constants.MAX_MATERIALS`.
     gate : bool
-        Whether a gate decides which spans have no highlight; it changes no pixel. ``chord-local``
-        has a `ValueGate`, methods of unit normals a `HighlightGate`.
+        Whether a gate decides which spans have no highlight; it changes no pixel. Methods of
+        unit normals have a `HighlightGate`.
     grey : bool
         Whether there is one channel in place of three. It uses the colour operands of red, and the pixel
         repeats it three times.

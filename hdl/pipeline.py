@@ -220,16 +220,13 @@ class ShadingPipelineUnit(wiring.Component):
             highlights=p.specular is not None,
             length_bits=p.length_bits,
             product_interval=product_interval,
-            gate=method.gate_inside(p) if p.gate else None,
-            takes_threshold=p.has_threshold,
             factors=p.factors,
         )
         self.setup_interval = self._interpolator.setup_interval
         self._shortest_interval = self._interpolator.shortest_interval
         self.latency = self._interpolator.latency + self._shading.latency + self._assembler.latency
         if p.gate:
-            self._gate = method.gate_beside(p, self.setup_interval)
-        if self._gate is not None:
+            self._gate = method.gate(p, self.setup_interval)
             # A FIFO before the gate, and one after it.
             decided = self._gate.latency + 2 * FIFO_LATENCY
             self.latency += max(decided - self._interpolator.latency, 0)
@@ -406,7 +403,7 @@ class ShadingPipelineUnit(wiring.Component):
         self, m: Module, frame: FrameConstantsUnit, albedo: stream.Interface | None
     ) -> list[tuple[Value, Value]]:
         """Connect the units from spans to colours. Returns valid and ready of the units that take spans."""
-        p, span = self.model, self.i.payload
+        span = self.i.payload
         m.submodules.interpolator = interpolator = self._interpolator
         m.submodules.intensity = self._shading.intensity
         sinks = [(interpolator.i.valid, interpolator.i.ready)]
@@ -414,11 +411,6 @@ class ShadingPipelineUnit(wiring.Component):
         m.d.comb += copy_fields(words, span)
         for vectors, light in zip(interpolator.light_vectors, frame.constants.lights, strict=False):
             m.d.comb += copy_fields(vectors, light, ("direction", "halfway"))
-        if interpolator.exponent is not None:
-            exponent = frame.constants.exponent if p.build.exponent is None else p.build.exponent
-            m.d.comb += interpolator.exponent.eq(exponent)
-        if interpolator.threshold is not None:
-            m.d.comb += Value.cast(interpolator.threshold).eq(frame.constants.threshold)
         operands, gated = interpolator.o, None
         if self._gate is not None:
             operands, gated = self._decide(m, frame, sinks)

@@ -115,8 +115,7 @@ class PixelShading:
         operands : stream.Interface or None
             Operands of pixels; ``None`` without lights.
         gated : Value or None
-            Decision of a gate for each light. ``None``: the operands contain the decision, if there is a
-            gate.
+            Decision of a gate for each light; ``None`` without a gate.
         albedo : stream.Interface or None
             Albedo of pixels. ``None``: pixels have no albedo.
         colors : stream.Interface
@@ -144,9 +143,8 @@ class PixelShading:
                 intensity.i.payload.diffuse[index].eq(terms.diffuse),
                 intensity.i.payload.specular[index].eq(terms.specular),
             ]
-            if p.gate:
-                decision = words.gated if gated is None else gated[index]
-                m.d.comb += light.i.payload.gated.eq(decision)
+            if gated is not None:
+                m.d.comb += light.i.payload.gated.eq(gated[index])
             if light.fades:
                 m.d.comb += light.i.payload.factor.eq(words.factor)
             if self.slope is not None:

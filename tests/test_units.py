@@ -31,7 +31,7 @@ SELDOM = (
     *OF_DOCUMENTS,
     *("difference_accumulator", "renormaliser", "renormalise_interpolator", "highlight_cosine"),
     *("chord_setup", "local_chord_interpolator", "light_products"),
-    *("highlight_gate", "power", "specular", "value_gate", "render", "pixel_pipelines", "framing"),
+    *("highlight_gate", "power", "specular", "render", "pixel_pipelines", "framing"),
     *("edge_setup", "edge_normals", "gradient_setup", "plane_setup", "plane_assembler", "span_attributes"),
     *("attribute_serialiser", "vertex_sort", "span_clip", "edge_walk", "vector_normaliser", "span_halver"),
     *("texture_address", "texel_memory", "texture_filter", "texture_sampler"),

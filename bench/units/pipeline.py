@@ -349,7 +349,8 @@ def _counters(unit, rng, count):
 
 # Variants.
 
-_FULL = preset("chord-local", "cosquad", lights=2, gate=True)
+_VALUES = preset("chord-local", "cosquad", lights=2)
+_FULL = preset("quadratic", "cosquad", lights=2, gate=True)
 _BOTH = ("renormalise, blinn", "quadratic, cosquad")
 """Variants that get every stimulus: with the table of the default model, and with a model of the documents.
 
@@ -364,11 +365,11 @@ DESIGNS: dict[str, ShadingPipeline] = {
     "3 materials": preset(model="cosquad", lights=2, materials=3, operand="one_minus_cosine"),
     "compact": preset(style="compact"),
     "compact, normals and a power": preset("linear", "blinn_product", style="compact"),
-    "gate": preset("chord-local", "coscos2", gate=True),
+    "gate": preset("quadratic", "coscos2", gate=True),
     "gate, compact": preset("quadratic", "lyon3", gate=True, style="compact"),
     "exponent": preset("renormalise", "coscos4", 2, exponent=60),
     "values, the second of 2 lights fades": preset("chord-local", "blinn", 2, factors=(1,)),
-    "no specular light, grey, few bits": replace(_FULL, specular=None, gate=False, grey=True, **_LESS),
+    "no specular light, grey, few bits": replace(_VALUES, specular=None, grey=True, **_LESS),
     "without lights": preset(model="cosquad", lights=0, materials=2),
     "srgb": preset(transfer="srgb"),
     "srgb, without lights": preset(lights=0, materials=2, transfer="srgb"),
@@ -384,27 +385,24 @@ LONG_DESIGNS: dict[str, ShadingPipeline] = {
     "quadratic-horner of a chord": preset("quadratic-horner", "cosquad", operand="one_minus_cosine"),
     "renormalise, N.H": preset("renormalise", "cosquad", lights=2, operand="cosine"),
     "renormalise, power, compact": preset("renormalise", "blinn_product", style="compact"),
-    "values, 2 lights": preset("chord-local", "cosquad", lights=2),
-    "sharp lobe": preset("chord-local", "ggx", 2, scale=6, gate=True),
-    "values, 2 lights, one fades, compact, gate": preset(
-        "chord-local", "lyon3", 2, factors=(0,), gate=True, style="compact"
-    ),
+    "values, 2 lights": _VALUES,
+    "sharp lobe": preset("chord-local", "ggx", 2, scale=6),
+    "values, 2 lights, one fades, compact": preset("chord-local", "lyon3", 2, factors=(0,), style="compact"),
     "values, compact, 3 materials": preset("chord-local", "cosquad", materials=3, style="compact"),
     "compact, 2 lights": preset("quadratic", "lyon3", 2, style="compact"),
     "compact, exponent": preset("quadratic", "exp", exponent=20, style="compact"),
-    "gate, 2 lights, compact": preset("chord-local", "cosquad", lights=2, gate=True, style="compact"),
-    "gate, quadratic": preset("quadratic", "cosquad", lights=2, gate=True),
+    "gate, 2 lights, compact": _FULL.built(style="compact"),
+    "gate, 2 lights": _FULL,
     "gate, linear of a chord": preset("linear", "lyon3", operand="one_minus_cosine", gate=True),
     "gate, bisection": preset("bisection", "exp", gate=True),
     "gate, angular": preset("angular", "cosquad", gate=True),
     "gate, recurrence": preset("recurrence", "cosquad", lights=2, gate=True),
-    "gate, values": preset("chord-local", "blinn_product", 2, gate=True),
     "gate, compact, power": preset("quadratic-horner", "blinn_product", gate=True, style="compact"),
     "gate, exponent": replace(_FULL, build=Build(exponent=20)),
     "grey": preset("renormalise", None, grey=True),
     "srgb, compact": preset(style="compact", transfer="srgb"),
     "srgb, without lights, grey": preset(lights=0, grey=True, transfer="srgb"),
-    "few bits": replace(_FULL, **_LESS),
+    "few bits": replace(_VALUES, **_LESS),
 }
 """Further pipelines by name, for the long run."""
 

@@ -16,7 +16,6 @@ from blysk.golden.lighting.factor import Factor
 from blysk.golden.lighting.highlight_operand import HighlightOperand
 from blysk.golden.lighting.lobe import Lobe
 from blysk.golden.lighting.specular import Specular
-from blysk.golden.lighting.value_gate import ValueGate
 from blysk.golden.methods.frame_steps import Bound, ErrorBounds, ExactShading, SpanCutter, SpanFiller
 from blysk.golden.methods.interpolator import Interpolator, Operands
 from blysk.golden.normals.difference_accumulator import DifferenceAccumulator
@@ -189,15 +188,6 @@ class LocalChordInterpolator(Interpolator):
     def lights_cut(self) -> bool:
         """``True``: see `cut`."""
         return True
-
-    @property
-    def serves_gate(self) -> bool:
-        """``True``: a `ValueGate`."""
-        return True
-
-    def gate(self, specular: HighlightOperand) -> ValueGate:
-        """Model of the gate by values of u."""
-        return ValueGate(specular)
 
     def geometry(self, lights: int) -> Geometry:
         """Raise `ValueError`, because triangles give no values."""

@@ -2,7 +2,7 @@
 
 from collections.abc import Sequence
 
-from amaranth.hdl import Cat, Module, Mux, Signal, Value, ValueLike, unsigned
+from amaranth.hdl import Cat, Module, Signal, Value, ValueLike, unsigned
 from amaranth.lib import data, fifo, stream, wiring
 from amaranth.lib.wiring import In, Out
 
@@ -19,7 +19,6 @@ from blysk.hdl.cosines.chord_setup import (
     light_values_shape,
     span_operands_shape,
 )
-from blysk.hdl.lighting.value_gate import ValueGateUnit
 from blysk.hdl.methods.light_products import operands_shape
 from blysk.hdl.normals.difference_accumulator import AccumulatorUnit
 
@@ -42,15 +41,13 @@ class ChordAccumulatorUnit(AccumulatorUnit):
         Number of lights, at least 1.
     highlights : bool
         Whether there is specular light, and so u.
-    gated : bool
-        Whether a span brings ``lit``, a gate's decision for each light.
     factors : sequence of int
         Indices of the lights that fade. Each of them has one more quadratic.
 
     Members
     -------
-    i : :py:`In(stream.Signature(StructLayout({"length": 12, "lit": lights})))`
-        Lengths of spans, 1 or more, and decisions.
+    i : :py:`In(stream.Signature(StructLayout({"length": 12})))`
+        Lengths of spans, 1 or more.
     words : :py:`In(StructLayout({"start": ..., "lights": ...}))`
         First values of the span that is taken in, and its differences. With factors also ``factor_start`` and
         ``factors``.
@@ -68,11 +65,10 @@ class ChordAccumulatorUnit(AccumulatorUnit):
         lights: int = 1,
         *,
         highlights: bool = True,
-        gated: bool = False,
         factors: Sequence[int] = (),
     ):
         self.model = p = model or LocalChordInterpolator()
-        self.gated, self.factors = gated, tuple(factors)
+        self.factors = tuple(factors)
         self.functions = ("diffuse", "highlight") if highlights else ("diffuse",)
         differences = chord_differences_shape(lights, highlights, p.setup, len(self.factors))
         words = {
@@ -83,12 +79,9 @@ class ChordAccumulatorUnit(AccumulatorUnit):
             start = data.ArrayLayout(FixedShape(p.setup.DIFFUSE_FORMAT), len(self.factors))
             words |= {"factor_start": start, "factors": differences["factors"].shape}
         self.words_shape = data.StructLayout(words)
-        span = {"length": unsigned(LENGTH_BITS)}
-        if gated:
-            span["lit"] = unsigned(lights)
         super().__init__(
-            data.StructLayout(span),
-            operands_shape(p, lights, highlights=highlights, gated=gated, factored=bool(self.factors)),
+            data.StructLayout({"length": unsigned(LENGTH_BITS)}),
+            operands_shape(p, lights, highlights=highlights, factored=bool(self.factors)),
             {"words": In(self.words_shape), "taken": Out(1)},
         )
 
@@ -113,18 +106,8 @@ class ChordAccumulatorUnit(AccumulatorUnit):
         return self.words
 
     def hold(self, m, load):
-        """Keep only the decision, because the words are on the port when they are taken in."""
-        if self.gated:
-            self._lit = Signal.like(self.i.payload.lit, name="lit", reset_less=True)
-            with m.If(self.i.ready):
-                m.d.sync += self._lit.eq(self.i.payload.lit)
+        """Keep nothing, because the words are on the port when they are taken in."""
         m.d.comb += self.taken.eq(load)
-
-    def carried(self, values):
-        """The decision of each light."""
-        if self.gated:
-            for index, light in enumerate(values):
-                yield ~self._lit[index], light.gated
 
     def quadratics(self, values):
         """Quadratics of each light, and of each factor."""
@@ -159,8 +142,6 @@ class ChordSpansUnit(wiring.Component):
         Whether there is specular light, and so u.
     length_bits : int
         Bits of the length.
-    gate : ValueGateUnit or None
-        Gate that decides whether a span has no highlight. ``None``: no gate.
     factors : sequence of int
         Indices of the lights that fade.
 
@@ -174,8 +155,6 @@ class ChordSpansUnit(wiring.Component):
         Operands of the pixels.
     out_of_range : :py:`Out(1)`
         High for one cycle for each span with a word out of range.
-    constants : :py:`In(10)` or :py:`In(18)`
-        Specular exponent or threshold, constant while spans are inside. Only if the gate has it as a port.
 
     Source: docs/theory/chord.md#differences.
     """
@@ -188,10 +167,8 @@ class ChordSpansUnit(wiring.Component):
         initiation_interval: int = 3,
         highlights: bool = True,
         length_bits: int = LENGTH_BITS,
-        gate: ValueGateUnit | None = None,
         factors: Sequence[int] = (),
     ):
-        self._gate = gate
         self._setup = ChordSetupUnit(
             model.setup,
             lights,
@@ -201,14 +178,10 @@ class ChordSpansUnit(wiring.Component):
             factors=len(factors),
         )
         self.multipliers = self._setup.multipliers
-        gated = gate is not None
-        self._accumulator = ChordAccumulatorUnit(
-            model, lights, highlights=highlights, gated=gated, factors=factors
-        )
+        self._accumulator = ChordAccumulatorUnit(model, lights, highlights=highlights, factors=factors)
         # One cycle is for the count of the waiting differences.
         self.latency = self._setup.latency + 1 + self._accumulator.latency
-        waits = 1 + FIFO_LATENCY + (gate.latency if gate else 0)
-        self.short_latency = waits + self._accumulator.latency
+        self.short_latency = 1 + FIFO_LATENCY + self._accumulator.latency
         super().__init__(
             {
                 "i": In(stream.Signature(span_operands_shape(lights, highlights, length_bits, len(factors)))),
@@ -216,7 +189,6 @@ class ChordSpansUnit(wiring.Component):
                 "o": Out(stream.Signature(self._accumulator.o.payload.shape())),
                 "out_of_range": Out(1),
             }
-            | (gate.ports if gated else {})
         )
 
     @property
@@ -249,22 +221,18 @@ class ChordSpansUnit(wiring.Component):
         span, joined = self.i.payload, accumulator.i
         depth = self.starts_inside
         m.submodules.lengths = lengths = fifo.SyncFIFOBuffered(width=len(span.length) + 1, depth=depth + 1)
-        known, gate_ready, accepted, popped = (Signal() for _ in range(4))
-        if self._gate is not None:
-            self._decide(m, joined, depth, known, gate_ready)
-        else:
-            m.d.comb += [known.eq(1), gate_ready.eq(1)]
+        accepted, popped = Signal(), Signal()
         length, is_long = lengths.r_data[:-1], lengths.r_data[-1]
         room, waits = self._count(m, accepted, popped)
         m.d.comb += [
             copy(setup.i.payload, span),
-            setup.i.valid.eq(self.i.valid & gate_ready & room & self.long),
+            setup.i.valid.eq(self.i.valid & room & self.long),
             setup.o.ready.eq(1),
-            self.i.ready.eq(room & gate_ready & (setup.i.ready | ~self.long)),
+            self.i.ready.eq(room & (setup.i.ready | ~self.long)),
             accepted.eq(self.i.valid & self.i.ready),
             joined.payload.length.eq(length),
-            joined.valid.eq(lengths.r_rdy & known & (waits | ~is_long)),
-            lengths.r_en.eq(joined.ready & known & (waits | ~is_long)),
+            joined.valid.eq(lengths.r_rdy & (waits | ~is_long)),
+            lengths.r_en.eq(joined.ready & (waits | ~is_long)),
             popped.eq(joined.valid & joined.ready & is_long),
             self.out_of_range.eq(setup.o.valid & setup.o.payload.out_of_range),
         ]
@@ -334,30 +302,6 @@ class ChordSpansUnit(wiring.Component):
             (differences, _keep(m, "differences", made, *came)),
         ):
             m.d.comb += Cat(Value.cast(words[name]) for name in names).eq(kept_words)
-
-    def _decide(self, m: Module, joined: stream.Interface, depth: int, known: Value, ready: Value) -> None:
-        """The gate beside the setup. A span waits for the gate's decision."""
-        m.submodules.value_gate = gate = self._gate
-        lights = len(gate.o.payload)
-        m.submodules.decisions = decisions = fifo.SyncFIFOBuffered(width=lights, depth=depth)
-        long = self.long
-        for given, light in zip(gate.i.payload, self.i.payload["values"], strict=True):
-            first, *others = (light.highlight[k].as_value() for k in range(3))
-            m.d.comb += given[0].as_value().eq(first)
-            m.d.comb += [given[k].as_value().eq(Mux(long, u, first)) for k, u in enumerate(others, 1)]
-        m.d.comb += [
-            # Every span goes to the starts and to the gate. Both take it on the same cycle.
-            gate.i.valid.eq(self.i.valid & self.i.ready),
-            ready.eq(gate.i.ready),
-            decisions.w_data.eq(gate.o.payload),
-            decisions.w_en.eq(gate.o.valid),
-            gate.o.ready.eq(decisions.w_rdy),
-            known.eq(decisions.r_rdy),
-            decisions.r_en.eq(joined.valid & joined.ready),
-            joined.payload.lit.eq(decisions.r_data),
-        ]
-        if gate.ports:
-            m.d.comb += gate.constants.eq(self.constants)
 
 
 def _keep(m: Module, name: str, word: ValueLike, written: Value, taken: Value, depth: int) -> Value:

@@ -18,7 +18,6 @@ from blysk.hdl.core.shapes import light_vectors_shape, span_normals_shape
 from blysk.hdl.core.stream import connect
 from blysk.hdl.core.views import copy
 from blysk.hdl.lighting.highlight_gate import HighlightGateUnit
-from blysk.hdl.lighting.value_gate import ValueGateUnit
 from blysk.hdl.methods.light_products import LightProductsUnit, operands_shape
 
 __all__ = ["InterpolatorUnit", "NormalInterpolatorUnit", "flag_spans", "span_words", "spelled"]
@@ -91,12 +90,6 @@ class InterpolatorUnit(wiring.Component):
         Bits of the length.
     product_interval : int
         Least cycles from a pixel to the next in the products with L and H, for methods that find normals.
-    gate : ValueGateUnit or None
-        Gate from `gate_inside`, which decides whether a span has no highlight. The operands then have
-        ``gated``.
-    takes_threshold : bool
-        Whether a threshold, in place of the exponent, tells where highlights end, see
-        `ShadingPipeline.threshold_of`.
     factors : sequence of int
         Indices of the lights that fade, for methods that serve them, see `ShadingPipeline`.
 
@@ -139,13 +132,8 @@ class InterpolatorUnit(wiring.Component):
         return ()
 
     @classmethod
-    def gate_inside(cls, design: ShadingPipeline) -> ValueGateUnit | None:
-        """The gate that decides inside this unit, for a design with a gate. ``None``: no gate is inside."""
-        return None
-
-    @classmethod
-    def gate_beside(cls, design: ShadingPipeline, setup_interval: int) -> PipelinedUnit | None:
-        """The gate that decides beside this unit, from the same spans. ``None``: no gate is beside it.
+    def gate(cls, design: ShadingPipeline, setup_interval: int) -> PipelinedUnit:
+        """The gate that decides beside this unit, from the same spans.
 
         Parameters
         ----------
@@ -192,16 +180,6 @@ class InterpolatorUnit(wiring.Component):
         """Ports for L and H of each light; empty for a method that does not read them."""
         return self.constants
 
-    @property
-    def exponent(self) -> Value | None:
-        """The specular exponent, from the constants; ``None`` if the method does not need it."""
-        return None
-
-    @property
-    def threshold(self) -> Value | None:
-        """The threshold, from the constants; ``None`` without a threshold."""
-        return None
-
     @classmethod
     def span_shape(cls, lights: int, *, highlights: bool = True, length_bits: int = LENGTH_BITS):
         """Shape of a span.
@@ -227,8 +205,6 @@ class InterpolatorUnit(wiring.Component):
         highlights: bool = True,
         length_bits: int = LENGTH_BITS,
         product_interval: int = 1,
-        gate: ValueGateUnit | None = None,
-        takes_threshold: bool = False,
         factors: Sequence[int] = (),
     ):
         intervals = self.setup_intervals(model)
@@ -245,20 +221,14 @@ class InterpolatorUnit(wiring.Component):
         self.highlights = highlights
         self.length_bits = length_bits
         self.product_interval = product_interval
-        self.gate = gate
-        self.takes_threshold = takes_threshold
         self.factors = tuple(factors)
         further = {"factors": len(factors)} if factors else {}
         further |= self.span_options(model)
         span = self.span_shape(lights, highlights=highlights, length_bits=length_bits, **further)
-        gated, factored = gate is not None, bool(factors)
+        operands = operands_shape(model, lights, highlights=highlights, factored=bool(factors))
         members = {
             "i": In(stream.Signature(span)),
-            "o": Out(
-                stream.Signature(
-                    operands_shape(model, lights, highlights=highlights, gated=gated, factored=factored)
-                )
-            ),
+            "o": Out(stream.Signature(operands)),
             "out_of_range": Out(1),
         }
         super().__init__(members | self.constant_members() | self.further_members())

@@ -22,7 +22,6 @@ def operands_shape(
     lights: int,
     *,
     highlights: bool = True,
-    gated: bool = False,
     factored: bool = False,
 ) -> data.ArrayLayout:
     """Shape of the operands of a pixel: for each light N·L, and N·H or 1 - N·H.
@@ -35,8 +34,6 @@ def operands_shape(
         Number of lights.
     highlights : bool
         Whether there is specular light.
-    gated : bool
-        Whether a gate's decision against a highlight comes with the operands.
     factored : bool
         Whether factors of the lights that fade come with the operands. Other lights have the factor 0, which
         has no use.
@@ -44,8 +41,6 @@ def operands_shape(
     operands = {"cosine": FixedShape(model.COSINE_FORMAT)}
     if highlights:
         operands["highlight"] = FixedShape(model.highlight_format)
-    if gated:
-        operands["gated"] = 1
     if factored:
         operands["factor"] = FixedShape(Factor.FORMAT)
     return data.ArrayLayout(data.StructLayout(operands), lights)

@@ -11,7 +11,6 @@ from blysk.golden.number.spans import LENGTH_BITS
 from blysk.hdl.core.stream import connect
 from blysk.hdl.core.views import copy
 from blysk.hdl.cosines.chord_setup import span_operands_shape
-from blysk.hdl.lighting.value_gate import ValueGateUnit
 from blysk.hdl.methods.chord_spans import ChordSpansUnit
 from blysk.hdl.methods.interpolator import InterpolatorUnit
 
@@ -36,11 +35,6 @@ class LocalChordInterpolatorUnit(InterpolatorUnit, model=LocalChordInterpolator)
         Number of lights, at least 1.
     options
         As for `InterpolatorUnit`, with a ``setup_interval`` of 1 to 6.
-
-    Members
-    -------
-    constants : :py:`In(10)` or :py:`In(18)`
-        Specular exponent or threshold, constant while spans are inside. Only if the gate has it as a port.
 
     Source: docs/theory/chord.md#local-lights.
     """
@@ -74,7 +68,6 @@ class LocalChordInterpolatorUnit(InterpolatorUnit, model=LocalChordInterpolator)
             initiation_interval=self.setup_interval,
             highlights=self.highlights,
             length_bits=self.length_bits,
-            gate=self.gate,
             factors=self.factors,
         )
         self.multipliers = self._spans.multipliers
@@ -104,8 +97,6 @@ class LocalChordInterpolatorUnit(InterpolatorUnit, model=LocalChordInterpolator)
             with m.Else():
                 m.d.sync += copy(end, values[2])
         connect(m, spans.o, wiring.flipped(self.o))
-        if "constants" in spans.signature.members:
-            m.d.comb += spans.constants.eq(self.constants)
         return m
 
     def _values(self, *spans: data.View) -> Iterator[tuple]:
@@ -116,41 +107,11 @@ class LocalChordInterpolatorUnit(InterpolatorUnit, model=LocalChordInterpolator)
         for index in range(len(self.factors)):
             yield f"factor_{index}", *(span.factors[index] for span in spans)
 
-    @classmethod
-    def gate_inside(cls, design):
-        """The value gate, which reads the values of the spans here."""
-        return ValueGateUnit(
-            design.highlight_gate,
-            design.lights,
-            exponent=design.build.exponent,
-            takes_threshold=design.has_threshold,
-        )
-
-    @classmethod
-    def gate_beside(cls, design, setup_interval):
-        """``None``, because the gate is inside."""
-        return None
-
     def constant_members(self):
-        """Exponent or threshold of a gate. Spans bring values in place of L and H."""
-        return {} if self.gate is None else self.gate.ports
+        """None, because spans bring values in place of L and H."""
+        return {}
 
     @property
     def light_vectors(self):
         """Empty, because the method does not read L and H."""
         return ()
-
-    @property
-    def _of_gate(self):
-        """Exponent or threshold of a gate, if it is a port. Else ``None``."""
-        return self.constants if "constants" in self.signature.members else None
-
-    @property
-    def exponent(self):
-        """Exponent of a gate, if it is a port."""
-        return None if self.takes_threshold else self._of_gate
-
-    @property
-    def threshold(self):
-        """Threshold of a gate, if it is a port."""
-        return self._of_gate if self.takes_threshold else None

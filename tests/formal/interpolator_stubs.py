@@ -20,7 +20,6 @@ from blysk.hdl.core.stream import connect_slice
 from blysk.hdl.cosines.highlight_cosine import HighlightCosineUnit
 from blysk.hdl.cosines.quotient_spans import QuotientSpansUnit
 from blysk.hdl.cosines.recurrence import RecurrenceUnit
-from blysk.hdl.lighting.value_gate import ValueGateUnit
 from blysk.hdl.methods.chord_spans import ChordAccumulatorUnit
 from blysk.hdl.methods.renormalise_interpolator import LineAccumulatorUnit
 from blysk.hdl.normals.adaptive_normaliser import AdaptiveNormaliserUnit
@@ -130,10 +129,6 @@ def chord_setup(span, gives):
     yield put(light_difference(gives), first_word(value(span)))
 
 
-def value_gate(values, gives):
-    yield gives.eq(Value.cast(values[0][0])[0])
-
-
 def middle_normal(span, gives):
     yield put(gives.normal_left[0], word(span.normal_left[0]))
 
@@ -238,11 +233,6 @@ class Vectors(Line):
         self.OF = lambda model: QuotientSpansUnit(*model, **options)
         super().__init__(model)
         self.begun, self.constants = Signal(name="begun"), self.OF(model).constants
-
-
-def gate() -> ValueGateUnit:
-    """A gate of one cycle."""
-    return short(ValueGateUnit, value_gate, 1)()
 
 
 def replace_parts(monkeypatch) -> None:

@@ -53,7 +53,6 @@ from .interpolator_stubs import (
     constant_coefficient,
     cosine,
     first_value,
-    gate,
     itself,
     left,
     light_difference,
@@ -227,10 +226,10 @@ def quotient_stretches(unit) -> Iterator[Stretch]:
 OPTIONS = {"setup_interval": INTERVAL, "length_bits": LENGTH_BITS}
 
 
-def spans_of(lights: int, *, gated: bool = False) -> ChordSpansUnit:
-    """Spans of values, with a gate or without."""
+def spans_of(lights: int) -> ChordSpansUnit:
+    """Spans of values."""
     options = {"initiation_interval": INTERVAL, "length_bits": LENGTH_BITS}
-    return ChordSpansUnit(LocalChordInterpolator(), lights, gate=gate() if gated else None, **options)
+    return ChordSpansUnit(LocalChordInterpolator(), lights, **options)
 
 
 UNITS = {
@@ -248,7 +247,6 @@ UNITS = {
         evaluator_stretches,
     ),
     "chord_spans": (partial(spans_of, 1), spans_stretches),
-    "chord_spans, gated": (partial(spans_of, 1, gated=True), spans_stretches),
     "angular": (partial(AngularInterpolatorUnit, AngularInterpolator(), 1, **OPTIONS), angular_stretches),
     "recurrence_interpolator": (
         partial(RecurrenceInterpolatorUnit, RecurrenceInterpolator(), 2, **OPTIONS),
@@ -352,7 +350,6 @@ STRETCHES = {
     "quadratic": 5,
     "quadratic-eval": 3,
     "chord_spans": 1,
-    "chord_spans, gated": 1,
     "angular": 6,
     "recurrence_interpolator": 5,
     "bisection_interpolator": 2,
@@ -360,11 +357,11 @@ STRETCHES = {
 }
 
 
-BOUNDED = {"chord_spans": 14, "chord_spans, gated": 14}
+BOUNDED = {"chord_spans": 14}
 """Cycles from power-up of what is not decided in time for runs of any length: FIFOs beside a setup. These
 take 15 seconds of a processor; each further cycle more than doubles that."""
 
-JOINED = (("chord_spans", 0), ("chord_spans, gated", 0))
+JOINED = (("chord_spans", 0),)
 """The stretches with these FIFOs."""
 
 

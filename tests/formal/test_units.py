@@ -27,7 +27,6 @@ pytestmark = pytest.mark.prove
 FURTHER = {
     "arccos": ("refitted, sequential",),
     "attributes": ("both, interval 3",),
-    "local_chord_interpolator": ("gated",),
     "intensity": ("2 lights, compact", "albedo, compact"),
     "light": ("cosquad, interval 3",),
     "light_products": ("cosines, 2 lights, interval 3",),

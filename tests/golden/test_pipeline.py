@@ -220,8 +220,7 @@ def spans_near_a_highlight(rng, halfway, level, angle):
     return [quantise(top * np.cos(end)[:, np.newaxis] + along * np.sin(end)[:, np.newaxis]) for end in ends]
 
 
-# The gate of chord-local has tests of its own.
-BY_NORMALS = [name for name, of in METHODS.items() if of.serves_gate and of.brings_ends]
+BY_NORMALS = [name for name, of in METHODS.items() if of.serves_gate]
 GATED = [(name, None) for name in BY_NORMALS] + [
     (name, "one_minus_cosine") for name in ("linear", "bisection", "quadratic")
 ]

@@ -30,7 +30,7 @@ DESIGNS = {
     "materials, lights, gate": preset("quadratic", "ggx", materials=3, lights=2, gate=True),
     "two banks of three materials": preset("linear", "beckmann", materials=3, banks=2),
     "compact, gate": preset("quadratic", "beckmann", materials=3, style="compact", gate=True, cutoff=1 / 510),
-    "fixed, gate, compact": preset("chord-local", "blinn", 2, exponent=20, gate=True, style="compact"),
+    "fixed, gate, compact": preset("quadratic", "blinn", 2, exponent=20, gate=True, style="compact"),
     "fixed roughness": preset("linear", "ggx", roughness=0.3),
     "values": preset("chord-local", "ggx"),
     "other size": preset("linear", "ggx", octaves=12, steps=32),

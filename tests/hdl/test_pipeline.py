@@ -11,7 +11,6 @@ import numpy as np
 import pytest
 from amaranth.hdl import UnusedElaboratable
 
-from blysk.bench.units.cosines.chord_setup import any_values
 from blysk.bench.units.operands import pairs_at
 from blysk.bench.units.pipeline import RECORD, case_of
 from blysk.bench.units.pipeline_spans import any_constants, any_spans, operands_of
@@ -166,18 +165,13 @@ def test_setup_intervals(method):
 
 
 @pytest.mark.long
-@pytest.mark.parametrize(("method", "interval"), [("chord-local", 3), ("quadratic", 4), ("quadratic", 7)])
+@pytest.mark.parametrize(("method", "interval"), [("quadratic", 4), ("quadratic", 7)])
 def test_gate_costs_no_cycle(method, interval):
-    """Decisions come in time for spans of every length, however many single pixels are on the way.
-
-    Where values of short spans waited, those with a decision come later by the 3 cycles that it takes, once.
-    """
+    """Decisions come in time for spans of every length, however many single pixels are on the way."""
     rng = np.random.default_rng(interval)
     design = preset(method, "cosquad", setup_interval=interval)
     lengths = np.r_[rng.integers(1, 40, 200), np.full(150, 1), np.full(60, 5)]
     spans, constants = spans_in_range(rng, design, lengths, 20.0)
-    if design.interpolator.serves_local:
-        spans = replace(spans, values=any_values(rng, len(lengths), design.lights))
     without, found = (
         shade(ShadingPipelineUnit(replace(design, gate=gate)), spans, constants) for gate in (False, True)
     )

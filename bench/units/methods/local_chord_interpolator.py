@@ -3,7 +3,6 @@
 from functools import partial
 
 import numpy as np
-from amaranth.lib.wiring import Component
 
 from blysk.bench.units.cosines.chord_setup import (
     FORMATS,
@@ -17,25 +16,15 @@ from blysk.bench.units.cosines.chord_setup import (
     values_of,
 )
 from blysk.bench.units.cosines.chord_setup import RECORD as SETUP
-from blysk.bench.units.lighting.specular import any_exponent
-from blysk.bench.units.lighting.value_gate import parabolas_near
 from blysk.bench.units.methods.interpolator import long_lengths, of_setup, operand_beats, options
 from blysk.bench.units.operands import any_codes, short_lengths, span_lengths
 from blysk.bench.units.record import Case, Record, Sample, Stimulus, Variant
-from blysk.golden.cosines.chord_setup import SpanValues
-from blysk.golden.lighting.value_gate import ValueGate
-from blysk.golden.methods.interpolator import Operands
 from blysk.golden.methods.local_chord_interpolator import LocalChordInterpolator
-from blysk.golden.number.fixed import Fixed
 from blysk.golden.number.spans import pixels_of
 from blysk.golden.number.unit_vector import ONE_SQUARED
-from blysk.hdl.lighting.value_gate import ValueGateUnit
 from blysk.hdl.methods.local_chord_interpolator import LocalChordInterpolatorUnit
 
-__all__ = ["RECORD", "gated", "mixed_lengths"]
-
-EXPONENT = 60
-"""Exponent of a run that needs only one exponent."""
+__all__ = ["RECORD", "mixed_lengths"]
 
 _STILL = {
     "a second difference is twice a number, so its last bit is 0": (
@@ -66,51 +55,9 @@ def _measure(rng, count):
     return Sample(found[:, kept], exact[:, kept], formula[:, kept], pixel[kept])
 
 
-def gated(lights: int, exponent: int | None = None, *, takes_threshold: bool = False) -> ValueGateUnit:
-    """Gate of an interpolator.
-
-    Parameters
-    ----------
-    lights : int
-        Number of lights.
-    exponent, takes_threshold
-        As in `ValueGateUnit`.
-    """
-    return ValueGateUnit(ValueGate(), lights, exponent=exponent, takes_threshold=takes_threshold)
-
-
-def _gated_beats(
-    unit: Component,
-    operands: Operands,
-    values: SpanValues,
-    length: np.ndarray,
-    exponent: int,
-    threshold: int | None = None,
-) -> np.ndarray:
-    """Output beats of a unit with these operands. If the unit has a gate, they have its decisions, too.
-
-    In a span of one or two pixels the gate decides each pixel by the pixel's u. In a longer span it decides
-    all pixels together. If ``threshold`` is given, the gate takes this code in place of the exponent.
-    """
-    if unit.gate is None:
-        return operand_beats(unit, operands)
-    span, pixel = pixels_of(length)
-    u = values.highlight[span].astype(np.int64)
-    own = np.where(pixel[:, np.newaxis] == 0, u[..., 0], u[..., 2])
-    u = np.where((length[span] < 3)[:, np.newaxis, np.newaxis], own[..., np.newaxis], u)
-    gate = unit.gate.model
-    if threshold is None:
-        lit = gate.compute(u, unit.gate.exponent or exponent)
-    else:
-        lit = gate.compute_by(u, Fixed(gate.THRESHOLD_FORMAT, np.int64(threshold)))
-    return operand_beats(unit, operands, gated=~lit)
-
-
 def _expect(unit, case):
     values, length = values_of(case.beats), case.beats["length"]
-    operands = unit.model.compute_values(values, length, factors_of(case.beats))
-    constant = {"threshold" if unit.takes_threshold else "exponent": case.constants}
-    return _gated_beats(unit, operands, values, length, **{"exponent": 1} | constant)
+    return operand_beats(unit, unit.model.compute_values(values, length, factors_of(case.beats)))
 
 
 def _status(unit, case):
@@ -119,13 +66,10 @@ def _status(unit, case):
     return {"out_of_range": int(np.count_nonzero(operands.out_of_range))}
 
 
-def _case(unit, rng, length, values=None, exponent=EXPONENT):
+def _case(unit, rng, length, values=None):
     length = np.maximum(length % (1 << unit.length_bits), 1)
     values = values or any_values(rng, len(length), unit.lights)
-    constants = exponent if "constants" in unit.signature.members else None
-    if unit.takes_threshold:
-        constants = int(unit.gate.model.thresholds.codes[exponent])
-    return Case(value_beats(unit, values, length), constants)
+    return Case(value_beats(unit, values, length))
 
 
 def mixed_lengths(rng: np.random.Generator, count: int) -> np.ndarray:
@@ -149,16 +93,6 @@ def _short_spans(unit, rng, count):
     return _case(unit, rng, mixed_lengths(rng, count), values)
 
 
-def _gate(unit, rng, count):
-    """Spans of 1 to 40 pixels with the least u near the threshold of the gate, for any exponent."""
-    exponent = unit.gate.exponent or any_exponent(rng)
-    nearest = min(unit.gate.model.thresholds.values[exponent] / 2, 2.0)
-    least = nearest + 1e-3 * rng.normal(size=count * unit.lights)
-    u = parabolas_near(rng, least).reshape(count, unit.lights, 3)
-    diffuse = any_values(rng, count, unit.lights).diffuse
-    return _case(unit, rng, mixed_lengths(rng, count), SpanValues(diffuse, u), exponent)
-
-
 def _long_spans(unit, rng, count):
     """Spans of 3000 to 4095 pixels, in which the last bits of differences count; and shorter spans."""
     return _case(unit, rng, long_lengths(rng, count))
@@ -167,25 +101,6 @@ def _long_spans(unit, rng, count):
 def _last_bits(unit, rng, count):
     """Many short spans, because a last bit changes a rounded result only once in thousands."""
     return _case(unit, rng, rng.integers(1, 8, count))
-
-
-class _Gated:
-    """Makes the unit with a gate of its own."""
-
-    def __init__(self, lights, exponent=None, **build):
-        self.arguments = lights, exponent, build
-
-    def __call__(self):
-        lights, exponent, build = self.arguments
-        gate = gated(lights, exponent, takes_threshold=build.get("takes_threshold", False))
-        return LocalChordInterpolatorUnit(_METHOD, lights, gate=gate, **build)
-
-
-_GATED = {
-    "gated": Variant(_Gated(1)),
-    "2 lights, gated, exponent 60": Variant(_Gated(2, 60, setup_interval=6)),
-    "gated, threshold": Variant(_Gated(1, takes_threshold=True)),
-}
 
 
 RECORD = Record(
@@ -205,14 +120,12 @@ RECORD = Record(
         "3 lights, interval 6": options(_METHOD, 3, setup_interval=6),
         "no highlights": options(_METHOD, 2, setup_interval=2, highlights=False, length_bits=5),
         "2 lights, the second fades": options(_METHOD, 2, setup_interval=3, factors=(1,)),
-        **_GATED,
     },
     expect=_expect,
     status=_status,
     stimuli={
         "spans": Stimulus(_spans, 2000),
         "short spans": Stimulus(_short_spans, 800),
-        "gate": Stimulus(_gate, 500, repeats=4, variants=tuple(_GATED)),
         "long spans": Stimulus(_long_spans, 60_000, stalled=False),
         "last bits": Stimulus(_last_bits, 8000, stalled=False),
         "corners": of_setup(SETUP),

@@ -9,7 +9,7 @@ from functools import cache
 import numpy as np
 import pytest
 
-from blysk.bench.units.methods.local_chord_interpolator import RECORD, gated
+from blysk.bench.units.methods.local_chord_interpolator import RECORD
 from blysk.golden.methods.local_chord_interpolator import LocalChordInterpolator
 from blysk.hdl.emit.cost import cost_of
 from blysk.hdl.methods.local_chord_interpolator import LocalChordInterpolatorUnit
@@ -26,9 +26,9 @@ CI = [pytest.mark.long, pytest.mark.ci]
 
 
 @cache
-def unit_of(with_gate=False):
+def unit_of():
     """One light, by the default options, the same for all tests: it is compiled once."""
-    return make(gate=gated(1)) if with_gate else make()
+    return make()
 
 
 def case_of(unit, length, seed=1):
@@ -82,12 +82,12 @@ LENGTHS = {
 }
 
 
+@pytest.mark.ci
 @pytest.mark.long
 @pytest.mark.parametrize("length", runs_of(LENGTHS))
-@pytest.mark.parametrize("with_gate", [pytest.param(True, marks=pytest.mark.ci), False])
-def test_a_pixel_in_every_cycle(length, with_gate):
+def test_a_pixel_in_every_cycle(length):
     """Spans of any length, mixed: from the first pixel of a long span on one in every cycle."""
-    unit = unit_of(with_gate)
+    unit = unit_of()
     # A span of three pixels comes first: short ones then wait for it, and none comes before its turn.
     length = np.array([3, *length])
     case = case_of(unit, length)

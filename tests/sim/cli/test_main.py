@@ -22,10 +22,10 @@ pytestmark = pytest.mark.usefixtures("folder")
 
 @pytest.mark.long
 def test_verilog_with_a_gate(capsys):
-    assert main(["verilog", "--method", "chord-local", "--gate"]) == 0
+    assert main(["verilog", "--method", "quadratic", "--gate"]) == 0
     output = capsys.readouterr().out
     assert "throughput style, highlight gate" in output
-    assert "value_gate" in output.partition("module")[2]
+    assert "highlight_gate" in output.partition("module")[2]
 
 
 @pytest.mark.parametrize("arguments", [["--help"], ["-h"], ["render", "--help"], ["verilog", "-h"]])
