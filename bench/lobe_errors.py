@@ -43,8 +43,8 @@ def largest_error(lobe: Lobe, parameter: float | None, samples: int = 256) -> fl
     parameter : float or None
         Parameter of the model.
     samples : int
-        Sampled operands in each step of the table, the first and the last operand among them. A step with
-        fewer operands has all operands.
+        Number of sampled operands in each step of the table. The first and the last operand are among them.
+        If a step has fewer operands, all are sampled.
     """
     knots = np.ldexp(lobe.knots, lobe.fraction_bits).astype(np.int64)
     first, last = knots[:-1, np.newaxis], knots[1:, np.newaxis] - 1
@@ -57,7 +57,7 @@ def largest_error(lobe: Lobe, parameter: float | None, samples: int = 256) -> fl
 
 
 def errors_of_size(octaves: int, steps: int, samples: int = 256) -> list[list[float]]:
-    """Largest errors of a size of the table, for each of `CASES`, see `largest_error`."""
+    """Largest errors of tables of this size: a row for each of `CASES`, by `largest_error`."""
     lobe = Lobe(BLINN, "one_minus_cosine", octaves, steps)
     return [
         [

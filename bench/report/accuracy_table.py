@@ -20,13 +20,13 @@ __all__ = ["accuracy_table", "main"]
 def accuracy_table(points: Sequence[Mapping[str, Any]]) -> str:
     """The table of docs/guide/accuracy.md, as Markdown: the designs of `DESIGNS`.
 
-    Largest arithmetic and method error in LSB at each exponent; largest total error, cycles a pixel and
-    millions of simulated pixels a second at exponent 100.
+    The table has the largest arithmetic and method error in LSB at each exponent. At exponent 100 it has the
+    largest total error, cycles a pixel and millions of simulated pixels a second.
 
     Parameters
     ----------
     points : sequence of dict
-        Points of `section`. Every design must be simulated, and exponent 100 be among the exponents.
+        Points of `section`. Every design must be simulated, and exponent 100 must be among the exponents.
     """
     from blysk.bench import accuracy
 

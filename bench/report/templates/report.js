@@ -9,7 +9,7 @@
     return element;
   }
 
-  // Numbers as the tables have them: four digits that count.
+  // Text of a value as in the tables: numbers have four significant digits.
   function shown(value) {
     if (value === null || value === undefined) return "–";
     if (typeof value !== "number") return typeof value === "boolean" ? (value ? "yes" : "no") : String(value);
@@ -32,7 +32,7 @@
   }
   const withUnit = (value, unit) => (unit && value !== null ? `${shown(value)} ${unit}` : shown(value));
 
-  // Tables: sorted by their headings, filtered by words.
+  // Tables. A click on a heading sorts the rows. Words in the search field filter the rows.
 
   function keyOf(cell) {
     if ("none" in cell.dataset) return null;
@@ -56,7 +56,8 @@
     heading.setAttribute("aria-sort", direction > 0 ? "ascending" : "descending");
   }
 
-  const conditions = new Map(); // By table, functions that tell whether a row is shown.
+  // For each table, functions of a row. The row is shown if all of them return true.
+  const conditions = new Map();
 
   function filter(table) {
     let count = 0;
@@ -101,7 +102,7 @@
     }
   }
 
-  // A link to something in a fold opens it; so does printing.
+  // A link to an element in a closed fold opens the fold. Printing opens all folds.
   const openTo = () => {
     const target = location.hash && byId(decodeURIComponent(location.hash.slice(1)));
     if (!target) return;
@@ -118,7 +119,7 @@
     for (const fold of document.querySelectorAll(".fold")) fold.open = true;
   });
 
-  // The contents are open where there is room beside the text.
+  // The table of contents is open if there is room beside the text.
   if (matchMedia("(max-width: 62rem)").matches) document.querySelector("nav details").open = false;
 
   if (!byId("data")) return;
@@ -158,7 +159,8 @@
   byId("mesh-label").hidden = meshes.length < 2;
   byId("mesh-label").style.display = meshes.length < 2 ? "none" : "";
   if (exponents.includes(100)) controls.exponent.value = 100;
-  // Nanoseconds tell designs apart that take the same cycles, where there are any.
+  // Designs with equal cycles may differ in nanoseconds. So the axis is nanoseconds at first, if more than half as many
+  // points have nanoseconds as have cycles.
   const having = (key) => points.filter((point) => point.times[key] !== null).length;
   if (having("ns_per_pixel") && 2 * having("ns_per_pixel") > having("cycles_per_pixel")) {
     controls.time.value = "ns_per_pixel";
@@ -201,7 +203,8 @@
     point.settings.source === controls.mesh.value;
   const inGroups = (point) => byId("groups").querySelector(`input[value="${point.group}"]`).checked;
 
-  // A scale: where a value is drawn, and its ticks. The better end is at 0.
+  // Scale of an axis of a given length: `place` maps a value to its distance from the better end. `ticks` are the
+  // values of the grid lines.
   function scaleOf(values, axis, length) {
     const positive = values.filter((value) => value > 0);
     const logarithmic = axis.unit !== "dB" && positive.length > 0 && values.every((value) => value >= 0);
@@ -214,7 +217,7 @@
     // Room for names at the better end.
     low -= axis.better === "more" ? margin : 2 * margin;
     high += axis.better === "more" ? 2 * margin : margin;
-    const start = zeros ? 34 : 0; // Room for what is exactly 0.
+    const start = zeros ? 34 : 0; // Room for the value 0, which has no logarithm.
     const place = (value) => {
       if (zeros && value === 0) return axis.better === "more" ? length - 14 : 14;
       const share = (to(value) - low) / (high - low);
@@ -241,7 +244,7 @@
 
   const plot = byId("plot"),
     tip = byId("tip");
-  let places = []; // Of the drawn points: {point, x, y, dot}.
+  let places = []; // {point, x, y, dot} of each drawn point.
   let current = null;
 
   function chosen() {
@@ -384,12 +387,13 @@
     );
   }
 
-  // Names where there is room for them: of the front first, of the others on a wide drawing.
+  // Writes the names of points where there is room. Points on the front come first. Other points are named only on a
+  // wide drawing.
   function name(svg, front, corners, edges) {
     const taken = places.map(({ x, y }) => [x - 7, y - 7, x + 7, y + 7]),
       lines = [];
     corners.forEach(({ x, y }, k) => {
-      // The front comes down from the corner before, and goes on to the next.
+      // The line of the front comes down from the corner before, and goes right to the next corner.
       const above = k ? corners[k - 1].y : edges.top,
         next = k + 1 < corners.length ? corners[k + 1].x : edges.right;
       lines.push([x - 1, above, x + 1, y], [x, y - 1, next, y + 1]);
@@ -546,7 +550,7 @@
   function open(point) {
     byId("panel-title").textContent = `${point.label}, exponent ${point.settings.exponent}`;
     byId("panel-verdict").textContent =
-      `${capital(groups.find(({ key }) => key === point.group).title)}. To the eye the frame ` +
+      `${capital(groups.find(({ key }) => key === point.group).title)}. To the eye, the frame ` +
       `${verdict(point.verdicts.total)} the exact frame, and ` +
       `${verdict(point.verdicts.method)} the frame with exact interpolation and the same model.`;
     const pictures = shotOf.get(point.id).querySelectorAll("span");
@@ -666,7 +670,7 @@
       table.parentNode.parentNode.insertBefore(make("div", { class: "tools" }), table.parentNode);
     tools.append(
       make("label", {}, all, " all columns"),
-      "The table shows the mesh, exponent and groups of the drawing.",
+      "The table has the designs of the drawing: its mesh, its exponent and the ticked groups.",
     );
     all.addEventListener("change", showColumns);
     for (const row of table.tBodies[0].rows) {

@@ -1,4 +1,4 @@
-// The page. Data come through `blysk.given`, from scripts that are added when they are wanted.
+// The live page. When the page needs data, it adds a script. The script calls `blysk.given` with the data.
 const blysk = (() => {
   const byId = (id) => document.getElementById(id);
   const site = JSON.parse(byId("site").textContent);
@@ -55,7 +55,7 @@ const blysk = (() => {
     return promises.get(name);
   }
 
-  // The worker: its text is that of functions here, as a page from disk may not load another script for it.
+  // The worker runs the text of functions of this script, because a page from a disk may not load a file for a worker.
 
   let worker = null;
   const answers = new Map();
@@ -117,7 +117,7 @@ const blysk = (() => {
   function settingsNow(name = state.method, reflection = state.model) {
     const reference = site.references[state.reference];
     const method = site.methods[name];
-    // A model with a roughness may have lobes as narrow as any.
+    // Lobes of a model with a roughness may be very narrow, so the spans are those of the largest exponent.
     const rough = site.rough.includes(reflection);
     const band = site.bands.findIndex((most) => (rough ? site.mostExponent : state.exponent) <= most);
     const { direction, exponent, roughness, ambient, diffuse, specular } = state;
@@ -136,7 +136,7 @@ const blysk = (() => {
     };
   }
 
-  // What stands right of the divider, if that is hardware, too: the method that shows at once why.
+  // Settings of the rival, which is drawn right of the divider; `null` if the exact frame is drawn there.
   function rivalNow() {
     if (state.compare !== "rival" || !site.rival || state.method === site.rival) return null;
     const model = `${site.rival}-${state.model}` in site.designs ? state.model : site.rivalModel;
@@ -195,7 +195,7 @@ const blysk = (() => {
     const now = performance.now();
     const between = now - painted;
     painted = now;
-    // A mean of times, not of rates: a browser may tell the time in coarse steps, and between two frames none.
+    // This is a mean of times, not of rates. A browser's clock may be coarse, so the time between two frames may be 0.
     if (between < 400) pause = pause ? 0.9 * pause + 0.1 * between : between;
     else pause = result.figures.milliseconds;
     if (orbiting && now - told < 200) return;
@@ -206,7 +206,7 @@ const blysk = (() => {
 
   const lsb = (value) => `${shown(value, 3)} LSB`;
 
-  // Figures of the frame; while it is watched, those of the pixels that have come.
+  // Shows the figures of the frame. `so` has the cycles and pixels until now, while the user watches the shading.
   function showFigures(so = null) {
     const { figures, rival, settings } = pageState.latest;
     const cycles = so ? so.cycles : figures.cycles;
@@ -231,10 +231,10 @@ const blysk = (() => {
     byId("other-text").textContent = rival ? `${site.rival}: ${lsb(rival.largest)}` : "exact, float64";
   }
 
-  // The light: a place in the picture is an angle from the viewer.
+  // The light. Its distance from the centre of the picture is proportional to its angle from the viewer.
 
   const canvas = byId("frame");
-  const RADIUS = 0.4; // Of the picture's height: at right angles to the viewer.
+  const RADIUS = 0.4; // Distance of a light at 90 degrees from the viewer, divided by the height of the picture.
   const along = (axis) => axis.reduce((sum, part, k) => sum + part * state.direction[k], 0);
 
   function lightPlace() {
@@ -342,7 +342,7 @@ const blysk = (() => {
   }
   byId("split").addEventListener("input", showSplit);
 
-  // The same frame as its pixels came, cycle by cycle.
+  // The same frame is drawn slowly, pixel by pixel, in the cycles in which the pixels came.
 
   let slow = 0;
 
@@ -388,8 +388,8 @@ const blysk = (() => {
   const controls = ["compare", "method", "model", "reference", "mesh", "color", "light", "ambient", "diffuse", "specular"];
 
   const COMPARED = {
-    exact: "normals of unit length at every pixel, in 53-bit arithmetic",
-    rival: "normals on a straight line between the ends of a span: too short in the middle, so highlights go dull",
+    exact: "normals of unit length at every pixel, computed in float64",
+    rival: "normals between the ends of a span are interpolated linearly: they are too short, so highlights get dull",
   };
 
   function showControls() {
@@ -422,7 +422,7 @@ const blysk = (() => {
     refresh();
   }
 
-  // What was looked into is of another frame.
+  // Closes the inside view. Its trace belongs to an earlier frame.
   function leave() {
     if (byId("inside").hidden) return;
     pageState.inside = null;
@@ -449,7 +449,7 @@ const blysk = (() => {
     changed();
   });
 
-  // Look inside: the span of a pixel, with its neighbours, cycle by cycle.
+  // The inside view shows the span of a pixel, and the neighbouring spans, cycle by cycle.
 
   async function look(x, y) {
     setOrbit(false);
@@ -468,7 +468,7 @@ const blysk = (() => {
     byId("inside").hidden = false;
     byId("pixel-x").value = x;
     byId("pixel-y").value = y;
-    // Where it does not stand beside the picture, it comes into sight.
+    // In a narrow window the inside view is below the picture, so the page scrolls to it.
     if (matchMedia("(max-width: 69.99rem)").matches) byId("inside").scrollIntoView({ block: "start" });
     if (span < 0) {
       byId("inside-title").textContent = `There is no surface at column ${x}, row ${y}.`;
@@ -496,8 +496,8 @@ const blysk = (() => {
     const cosine = product(0, 1) / Math.sqrt(product(0, 0) * product(1, 1) || 1);
     byId("inside-title").textContent =
       `Column ${x}, row ${y}: pixel ${x - codes.x[span] + 1} of a span of ${inside.length}, columns ${codes.x[span]} to ` +
-      `${codes.x[span] + inside.length - 1}, whose normal turns by ${shown((Math.acos(Math.min(cosine, 1)) * 180) / Math.PI, 3)}°. ` +
-      `The span enters on clock ${inside.firstClock}; its pixels come out on cycles ${trace.cycles[inside.start]} to ${inside.lastClock}.`;
+      `${codes.x[span] + inside.length - 1}. The normal turns by ${shown((Math.acos(Math.min(cosine, 1)) * 180) / Math.PI, 3)}° along the span. ` +
+      `The span goes in on cycle ${inside.firstClock}, and its pixels come out on cycles ${trace.cycles[inside.start]} to ${inside.lastClock}.`;
     const clock = byId("clock");
     clock.min = inside.firstClock;
     clock.max = inside.lastClock;
@@ -507,14 +507,15 @@ const blysk = (() => {
     mark.style.top = `${(100 * (y + 0.5)) / site.height}%`;
     drawPipeline(inside);
     drawWave(inside);
-    // Where the pixel's terms meet.
+    // The view starts at the cycle in which the terms of the pixel are added.
     const chosen = [...inside.taken].find(([, n]) => n === inside.start + x - codes.x[span]);
     setClock(chosen[0] + design.stages[1].to);
     document.body.dataset.inside = `${x},${y},${settings.design}`;
   }
   byId("look").addEventListener("click", () => look(Number(byId("pixel-x").value), Number(byId("pixel-y").value)));
 
-  // What each word of a pixel would be in exact arithmetic, by the names of `blysk.sim.engines.probes`; null where it has no meaning.
+  // Exact values of the words of a pixel, by the names of `blysk.sim.engines.probes`. A value is null if the word means
+  // nothing for this pixel.
   function exactValues({ spans, from, settings, model, curve, chord, trace, design }) {
     const { one } = site.tables;
     const normal = [0, 0, 0];
@@ -547,12 +548,13 @@ const blysk = (() => {
     };
   }
 
-  // A word in a cycle: code, value, the pixel it belongs to, and what it would be exactly.
+  // A word in a cycle: its code, its value, the pixel that it belongs to, the exact value and the error.
   function wordAt(inside, probe, clock) {
     const field = inside.design.ports.status.fields[probe.name];
     const code = inside.code(probe.name, clock);
     const value = core.decoded(code, field);
-    // Where a pixel waits before the lights take it, those behind it are not where they are else.
+    // If a pixel waited for the lights in a late cycle, the pixels behind it are late, too. Then `age` does not tell
+    // the pixel.
     let late = false;
     for (let k = Math.max(clock - 4, 1); k < clock - probe.age; k++) late ||= inside.code("waits", k) === 1;
     const pixel = late ? undefined : inside.taken.get(clock - probe.age);
@@ -700,9 +702,9 @@ const blysk = (() => {
       });
       const isOwn = inHere.has(inside.start);
       card.querySelector(".note").textContent = isOwn
-        ? "This span is in its setup, which computes once what its pixels share."
+        ? "This span is in its setup. The setup computes the values that all pixels of the span share."
         : inHere.size
-          ? "Another span is in its setup, while the pixels of this span go on."
+          ? "Another span is in its setup. The pixels of this span are in the other stages."
           : "No span is in the setup.";
     } else {
       for (const [taken, n] of inside.taken) {
@@ -755,7 +757,7 @@ const blysk = (() => {
     setClock(pageState.inside.clock + step);
   });
 
-  // Beginning.
+  // The start of the page.
 
   document.documentElement.classList.add("scripted");
   for (const box of document.querySelectorAll("[data-color]")) box.style.background = `rgb(${box.dataset.color})`;
@@ -765,8 +767,8 @@ const blysk = (() => {
     byId("view").hidden = false;
     startWorker();
     showControls();
-    // The other scripts call `blysk`, which is there when this one has ended. The first frames are slow: the browser
-    // compiles anew what is used much.
+    // Other scripts call `blysk`, which exists after this script. So the first frame waits for a timeout. The first
+    // frames are slow, because the browser still optimises the code.
     showSplit();
     setTimeout(async () => {
       for (let k = 0; k < 4; k++) await refresh();

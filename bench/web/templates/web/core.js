@@ -1,9 +1,9 @@
 "use strict";
-// What the page and its worker share: beats, frame constants, the float64 reference, the simulation. Formats, addresses,
-// curves and slopes come as JSON from Python. The names and the roundings are those of `golden` and `sim`.
-// A function, so that its text makes the worker, too.
+// Functions that the page and its worker share: beats, frame constants, the float64 reference, the simulation. Formats,
+// addresses, curves and slopes come as JSON from Python. Names and roundings are the same as in `golden` and `sim`.
+// All is in one function, because the page also sends the text of this function to its worker.
 const blyskCore = () => {
-  // Fields of packed beats.
+  // Fields of packed beats: `put` writes a code into words that are 0, and `get` reads a code.
 
   function put(words, base, field, code) {
     const value = code & (field.width < 32 ? (1 << field.width) - 1 : -1);
@@ -13,7 +13,7 @@ const blyskCore = () => {
     if (shift + field.width > 32) words[at + 1] |= value >>> (32 - shift);
   }
 
-  // Up to 53 bits.
+  // A field has up to 53 bits.
   function get(words, base, field) {
     let value = 0;
     for (let done = 0; done < field.width; ) {
@@ -29,7 +29,7 @@ const blyskCore = () => {
 
   const decoded = (code, field) => code * 2 ** -field.fraction;
 
-  // Data as they come: base 64 of zlib.
+  // Data come compressed by zlib, as base 64.
 
   async function unpacked(text) {
     const bytes = Uint8Array.from(atob(text), (letter) => letter.charCodeAt(0));
@@ -37,7 +37,8 @@ const blyskCore = () => {
     return new Uint8Array(await new Response(stream).arrayBuffer());
   }
 
-  // Spans of a view: two counts, then a column a field, the lowest bytes of all codes first; a bit a fragment.
+  // Decodes the spans of a view. The bytes are: the numbers of spans and of fragments, a column for each field, and a
+  // bit for each fragment that tells whether it is visible. A column has the lowest bytes of all codes first.
   function spansOf(bytes, columns) {
     const counts = new DataView(bytes.buffer, bytes.byteOffset);
     const count = counts.getUint32(0, true);
@@ -81,7 +82,7 @@ const blyskCore = () => {
     return Math.hypot(...total) > 1e-9 ? normalised(total) : [0, 0, 0];
   }
 
-  // Of the eight neighbours on the grid of codes the one whose length is nearest to 1.
+  // Of the eight points of the grid of codes around a vector, the point whose length is nearest to 1.
   function quantised(vector, one) {
     const low = vector.map((part) => Math.floor(part * one));
     const high = vector.map((part) => Math.ceil(part * one));
@@ -95,7 +96,8 @@ const blyskCore = () => {
     return best.map((code) => Math.min(Math.max(code, -one), one));
   }
 
-  // The curve of sRGB: LSB of the code of linear light; linear light of a code, 0 to 1. See `golden.reference.transfer`.
+  // The curve of sRGB, see `golden.reference.transfer`. `encoded` turns linear light into LSB of 8-bit sRGB, not
+  // rounded. `linear` turns a code from 0 to 1 into linear light.
   const encoded = (light) => {
     if (light <= 0.0031308) return light <= 0 ? 0 : 255 * 12.92 * light;
     return light >= 1 ? 255 : 255 * (1.055 * light ** (1 / 2.4) - 0.055);
@@ -104,7 +106,7 @@ const blyskCore = () => {
 
   const colorCode = (intensity, format) => Math.floor(intensity * 255 * 2 ** format.fraction + 0.5);
 
-  // Intensities of the three terms, from what the sliders say.
+  // Intensities of the three terms, from the settings of the page.
   function termsOf(settings) {
     return {
       ambient: settings.color.map((part) => settings.ambient * part),
@@ -113,7 +115,8 @@ const blyskCore = () => {
     };
   }
 
-  // The frame of a light, as `light_frame` makes it: H along z, L and V in the xz plane.
+  // Axes of the frame of a light, as in `light_frame`: H is along z, and L and V are in the xz plane. `sine` and
+  // `cosine` are of half the angle from L to V.
   function lightFrame(direction, viewer) {
     const dot = (one, other) => one[0] * other[0] + one[1] * other[1] + one[2] * other[2];
     const total = direction.map((part, k) => part + viewer[k]);
@@ -136,7 +139,7 @@ const blyskCore = () => {
     return { x, y, z, sine, cosine };
   }
 
-  // Axes of the components of vectors, by their names, as `vector_axes` has them of one light with highlights.
+  // Axes of the named components of vectors, as in `vector_axes` for one light with highlights.
   function vectorAxes(components, { x, y, z, sine, cosine }) {
     const scaled = (factor) => y.map((part) => factor * part);
     const mirrors = components.includes("s0");
@@ -144,7 +147,8 @@ const blyskCore = () => {
     return components.map((name) => axes[name]);
   }
 
-  // Vectors of spans in the frame of the light: codes of start, step and exponent, as `SpanVectors.quantise` rounds them.
+  // Vectors of the spans `from` to `to - 1` in the frame of the light: arrays of the codes of start, step and exponent,
+  // rounded as in `SpanVectors.quantise`.
   function vectorsOf(codes, from, to, components, frame, { fraction, margin }) {
     const axes = vectorAxes(components, frame);
     const unit = 2 ** fraction;
@@ -200,13 +204,14 @@ const blyskCore = () => {
     };
   }
 
-  // Codes of sin a, 0 and cos a: nearest, halves to even.
+  // Codes of sin a, 0 and cos a, rounded to nearest, and halves to even.
   function directionCodes({ sine, cosine }, one) {
     const nearest = (value) => (value % 1 === 0.5 ? 2 * Math.round(value / 2) : Math.round(value));
     return [nearest(sine * one), 0, nearest(cosine * one)];
   }
 
-  // Entries of a lobe's table, as `blysk.golden.lighting.lobe` makes them of a curve that falls, or of two parts.
+  // Entries of a lobe's table, as in `blysk.golden.lighting.lobe`. A table of two parts has its second part from the
+  // entry `border`. If the curve falls, no entry is larger than the entry before.
   function tableOf({ model, entries, middles, border }, parameter) {
     const reflect = reflection(model, parameter);
     const value = entries.map(reflect);
@@ -224,7 +229,7 @@ const blyskCore = () => {
     });
   }
 
-  // Beats of the write port.
+  // Beats of the write port that write the constants of a frame.
   function writesOf(constants, tables, port) {
     const beats = [];
     for (const [fields, base] of [
@@ -248,7 +253,7 @@ const blyskCore = () => {
 
   // The reference in float64.
 
-  // By the exponent, or by the roughness of a model that has one.
+  // Highlight as a function of N·H or R·V. `exponent` is the roughness if the model has a roughness.
   function reflection(model, exponent) {
     if (model.kind === "ggx") {
       const alpha = exponent ** 2;
@@ -272,8 +277,8 @@ const blyskCore = () => {
     };
   }
 
-  // Normals along a span, from the codes of its ends: a function of t that fills `normal`. "exact" ones are those of the
-  // surface. Written out a component at a time, as it is called for every span of every frame.
+  // Normals along a span, from the codes of its ends. The returned function of t writes the normal at t to `normal`.
+  // The kind "exact" has the exact, perspective-correct normals of the surface. Components are written out for speed.
   function curveOf(kind, spans, span, one, normal) {
     const { codes } = spans;
     const lx = codes["normal_left.0"][span] / one;
@@ -319,7 +324,7 @@ const blyskCore = () => {
     };
   }
 
-  // What every pixel is shaded from: N·L, N·H or R·V, both terms, the intensities.
+  // The returned function computes, from the normal of a pixel: N·L, N·H or R·V, both terms, and the color.
   function shader(settings, viewer, model, chord) {
     const direction = normalised(settings.direction);
     const halfway = halfwayVector(direction, viewer);
@@ -346,7 +351,7 @@ const blyskCore = () => {
     };
   }
 
-  // Normals of the fragments that show, in the order of the spans: they do not depend on the light.
+  // Normals of the visible fragments, in the order of the spans. They do not depend on the light.
   function normalsOf(spans, curve, one) {
     const values = new Float64Array(3 * spans.shown);
     const normal = [0, 0, 0];
@@ -367,7 +372,8 @@ const blyskCore = () => {
     return values;
   }
 
-  // Channels in LSB of sRGB of the fragments that show, in the order of the spans; not rounded. What `shader` does, for all.
+  // Channels of the visible fragments in LSB of sRGB, in the order of the spans, not rounded. The formulas are those of
+  // `shader`, in one loop for speed.
   function reference(normals, settings, viewer, model, chord) {
     const values = new Float64Array(normals.length);
     const [lx, ly, lz] = normalised(settings.direction);
@@ -399,7 +405,7 @@ const blyskCore = () => {
     return values;
   }
 
-  // The largest error, and that which one in a thousand exceeds, linear between neighbours.
+  // The largest error, and the 99.9th percentile. The percentile is interpolated linearly between two errors.
   function errorFigures(errors) {
     const count = errors.length;
     if (!count) return { largest: NaN, p999: NaN };
@@ -419,7 +425,7 @@ const blyskCore = () => {
     return { largest: top[top.length - 1], p999: low + (rank - Math.floor(rank)) * (high - low) };
   }
 
-  // A module with the spans of a view.
+  // An instance of a module with the spans of a view.
   class Simulation {
     constructor(module, design, tables) {
       this.exports = new WebAssembly.Instance(module, {}).exports;
@@ -435,7 +441,7 @@ const blyskCore = () => {
       return new Uint32Array(this.exports.memory.buffer, at, count);
     }
 
-    // Packs spans; of a span that is looked into only a few are.
+    // Packs the spans `from` to `to - 1` as input beats. A trace needs only a few spans.
     load(spans, from = 0, to = spans.count) {
       const port = this.design.ports.i;
       this.exports.release();
@@ -452,7 +458,7 @@ const blyskCore = () => {
       for (const [name, field] of Object.entries(port.fields))
         if (spans.codes[name])
           for (let k = 0; k < this.count; k++) put(words, k * port.words, field, spans.codes[name][from + k]);
-      // Vectors follow the light.
+      // The vectors depend on the light, so `turn` adds them for each frame.
       this.plain = this.design.vectors && words.slice();
     }
 
@@ -479,7 +485,7 @@ const blyskCore = () => {
       );
     }
 
-    // Channels of all pixels in their order. An error if others came than were asked for.
+    // Simulates a frame. `words` are the output beats in order of pixels. `each` has the cycle of each output beat.
     run(settings, viewer) {
       this.prepare(settings, viewer);
       const end = this.exports.run();
@@ -496,7 +502,8 @@ const blyskCore = () => {
       };
     }
 
-    // The same with the status after each cycle, and the cycles on which spans went in and pixels came out.
+    // Simulates the spans, and returns the status after each cycle, and the cycles on which spans went in and pixels
+    // came out.
     trace(settings, viewer) {
       const size = this.design.ports.status.words;
       const limit = 4096;

@@ -1,4 +1,4 @@
-// The worker: simulates, and works out the reference and the errors, while the page stays free.
+// The worker simulates, and computes the reference and the errors. The page can react meanwhile.
 const blyskWorker = (core) => {
   const designs = new Map();
   const views = new Map();
@@ -6,7 +6,7 @@ const blyskWorker = (core) => {
   const normals = new Map();
   let settingsOfPage = null;
 
-  // Normals by spans and curve: a view's, as long as it is drawn.
+  // Stored normals by spans and curve. A view has the same normals in each frame.
   const normalsOf = (name, spans, curve) => {
     const key = `${name} ${curve}`;
     if (!normals.has(key)) {
@@ -29,7 +29,7 @@ const blyskWorker = (core) => {
       return [offset >>> 5, offset & 31, 2 ** width - 1];
     });
 
-  // The frame of a run, and where its pixels are: a place each, or -1 for one that is hidden.
+  // The frame of a run, and the index of each output pixel in the frame. The index of a hidden pixel is -1.
   const frameOf = (words, { spans, design }) => {
     const { width } = settingsOfPage;
     const size = design.ports.o.words;
@@ -43,7 +43,7 @@ const blyskWorker = (core) => {
       for (let n = first; n < spans.first[span + 1]; n++) {
         const base = n * size;
         if (((words[base + xw] >>> xs) & xm) !== left + n || ((words[base + yw] >>> ys) & ym) !== row)
-          throw new Error("another pixel came than was asked for");
+          throw new Error("a pixel came out of order");
         if (!spans.visible[n]) {
           order[n] = -1;
           continue;
@@ -58,7 +58,8 @@ const blyskWorker = (core) => {
     return { frame, order };
   };
 
-  // Largest error of each pixel that shows; all errors.
+  // Errors of the channels of all visible pixels, and the largest error of each visible pixel. If `golden` is given,
+  // the rounded reference is drawn into it.
   const errorsOf = (frame, order, exact, golden) => {
     const errors = new Float64Array(exact.length);
     const worst = new Float64Array(exact.length / 3);
@@ -86,7 +87,7 @@ const blyskWorker = (core) => {
     return { errors, worst };
   };
 
-  // Colours in equal steps from 0 to the largest error of the frame.
+  // Map of errors. Its colours are equal steps from 0 to the largest error of the frame.
   const mapOf = (worst, largest, order) => {
     const { colors } = settingsOfPage.errorMap;
     const map = empty(0);
@@ -104,7 +105,7 @@ const blyskWorker = (core) => {
     return map;
   };
 
-  // Simulations of the two designs that are compared, each with its spans.
+  // Simulation of a design with its spans. Two simulations are stored: of the frame, and of the rival.
   const load = (settings) => {
     const key = `${settings.design} ${settings.spans}`;
     const { module, design } = designs.get(settings.design);
