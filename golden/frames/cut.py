@@ -28,6 +28,9 @@ __all__ = [
     "split_pairs",
 ]
 
+_Criterion = Callable[[np.ndarray, np.ndarray, np.ndarray], np.ndarray]
+"""Whether parts of spans have to be halved: of span, first pixel and last pixel."""
+
 _LARGEST_RATIO = 128.0
 """Ratio of depths up to which a colour is exact to a part of an LSB."""
 
@@ -37,7 +40,7 @@ def cut_spans(scene: Scene, raster: Raster, design: ShadingPipeline) -> tuple[Ra
 
     The normal at a cut is the true normal of the surface, ``normalise((1-t) m_l N_l + t m_r N_r)`` along the
     given span. The rasteriser gives the lengths m. An odd pixel goes to the right half. The fragments and
-    their order do not change. For a design with an albedo `cut_by_attributes` cuts first.
+    their order do not change. For a design with an albedo spans are cut as `cut_by_attributes` cuts, too.
 
     Parameters
     ----------
@@ -53,13 +56,9 @@ def cut_spans(scene: Scene, raster: Raster, design: ShadingPipeline) -> tuple[Ra
     raster : Raster
         The same fragments in narrower spans, with the weights and lengths m of their ends.
     cut : int
-        Number of given spans that were cut. Parts from `cut_by_attributes` that are cut again count again.
+        Number of given spans that were cut.
     """
-    if design.albedo is None:
-        return design.interpolator.cut(cutter_of(scene, raster, design))
-    given, before = cut_by_attributes(scene, raster)
-    cut, count = design.interpolator.cut(cutter_of(scene, given, design))
-    return cut, before + count
+    return design.interpolator.cut(cutter_of(scene, raster, design))
 
 
 @dataclass(frozen=True)
@@ -74,25 +73,28 @@ class _Cutter:
     def _limits(self) -> HighlightLimits:
         return HighlightLimits.of(self.scene, self.design)
 
+    @property
+    def _also(self) -> _Criterion | None:
+        return None if self.design.albedo is None else _by_attributes(self.scene, self.raster)
+
     def by_error(self) -> tuple[Raster, int]:
-        return cut_by_error(self.scene, self.raster, self.design.interpolator, self._limits)
+        return cut_by_error(self.scene, self.raster, self.design.interpolator, self._limits, self._also)
 
     def by_angle(self) -> tuple[Raster, int]:
-        return cut_by_angle(
-            self.raster, min(map(self.design.interpolator.widest_span, self._limits.exponents))
-        )
+        widest = min(map(self.design.interpolator.widest_span, self._limits.exponents))
+        return cut_by_angle(self.raster, widest, self._also)
 
     def by_length(self, largest_ratio: float) -> tuple[Raster, int]:
-        return cut_by_length(self.raster, largest_ratio)
+        return cut_by_length(self.raster, largest_ratio, self._also)
 
     def by_ends(self, largest_ratio: float) -> tuple[Raster, int]:
-        return cut_by_ends(self.raster, largest_ratio)
+        return cut_by_ends(self.raster, largest_ratio, self._also)
 
     def uncut(self) -> Raster:
-        return self.raster
+        return self.raster if self._also is None else _halve(self.raster, self._also)[0]
 
     def split_pairs(self) -> Raster:
-        return split_pairs(self.raster)
+        return split_pairs(self.raster, self._also)
 
     def missed(self, cut: Raster) -> int:
         return missed_spans(self.scene, cut, self.design.interpolator, self._limits)
@@ -103,7 +105,7 @@ def cutter_of(scene: Scene, raster: Raster, design: ShadingPipeline) -> SpanCutt
     return _Cutter(scene, raster, design)
 
 
-def cut_by_angle(raster: Raster, largest_angle: float) -> tuple[Raster, int]:
+def cut_by_angle(raster: Raster, largest_angle: float, also: _Criterion | None = None) -> tuple[Raster, int]:
     """Halve spans of more than two pixels until the angle between their end normals is small enough.
 
     Parameters
@@ -112,6 +114,8 @@ def cut_by_angle(raster: Raster, largest_angle: float) -> tuple[Raster, int]:
         Spans.
     largest_angle : float
         Largest angle in degrees, over 0.
+    also : callable, optional
+        Whether to halve parts of spans for another reason: of span, first pixel and last pixel.
 
     Returns
     -------
@@ -125,7 +129,7 @@ def cut_by_angle(raster: Raster, largest_angle: float) -> tuple[Raster, int]:
         wide: np.ndarray = (np.einsum("ij,ij->i", left, right) < cosine) & (last > first)
         return wide
 
-    return _halve(raster, is_wide)
+    return _halve(raster, is_wide, also)
 
 
 def cut_by_attributes(scene: Scene, raster: Raster) -> tuple[Raster, int]:
@@ -147,6 +151,11 @@ def cut_by_attributes(scene: Scene, raster: Raster) -> tuple[Raster, int]:
 
     Source: docs/theory/textures.md#cuts.
     """
+    return _halve(raster, _by_attributes(scene, raster))
+
+
+def _by_attributes(scene: Scene, raster: Raster) -> _Criterion:
+    """The criterion of `cut_by_attributes`."""
     size = texel_places(scene, raster)[2]
 
     def is_wide(origin: np.ndarray, first: np.ndarray, last: np.ndarray) -> np.ndarray:
@@ -163,10 +172,10 @@ def cut_by_attributes(scene: Scene, raster: Raster) -> tuple[Raster, int]:
             wide |= (np.abs(right - left) * size[origin] > MOST_TEXELS).any(axis=1)
         return wide & (last > first)
 
-    return _halve(raster, is_wide)
+    return is_wide
 
 
-def cut_by_length(raster: Raster, largest_ratio: float) -> tuple[Raster, int]:
+def cut_by_length(raster: Raster, largest_ratio: float, also: _Criterion | None = None) -> tuple[Raster, int]:
     """Halve spans until no pixel's N/W is too short compared with the longer end's N/W.
 
     N/W is short if W differs much along a span, or if the ends are nearly opposite.
@@ -177,6 +186,8 @@ def cut_by_length(raster: Raster, largest_ratio: float) -> tuple[Raster, int]:
         Spans.
     largest_ratio : float
         Largest length of N/W at an end, divided by the length of N/W at a pixel.
+    also : callable, optional
+        As for `cut_by_angle`.
 
     Returns
     -------
@@ -198,10 +209,10 @@ def cut_by_length(raster: Raster, largest_ratio: float) -> tuple[Raster, int]:
         wide: np.ndarray = (np.minimum(*least) * largest_ratio < longest) & (last > first)
         return wide
 
-    return _halve(raster, is_wide)
+    return _halve(raster, is_wide, also)
 
 
-def cut_by_ends(raster: Raster, largest_ratio: float) -> tuple[Raster, int]:
+def cut_by_ends(raster: Raster, largest_ratio: float, also: _Criterion | None = None) -> tuple[Raster, int]:
     """Halve spans whose ends N/W differ by more than a ratio in length, or by over 90 degrees in direction.
 
     Spans of two pixels become two spans of one pixel, whatever their ends.
@@ -212,12 +223,14 @@ def cut_by_ends(raster: Raster, largest_ratio: float) -> tuple[Raster, int]:
         Spans.
     largest_ratio : float
         Largest ratio of the lengths of N/W.
+    also : callable, optional
+        As for `cut_by_angle`.
 
     Returns
     -------
     raster, cut
         As `cut_spans` returns them. Spans of two pixels count as cut only if their ends differ by more than
-        the limits.
+        the limits, or for the other reason.
     """
 
     def differs(origin: np.ndarray, first: np.ndarray, last: np.ndarray) -> np.ndarray:
@@ -226,7 +239,8 @@ def cut_by_ends(raster: Raster, largest_ratio: float) -> tuple[Raster, int]:
         shorter, longer = np.sort([np.linalg.norm(end, axis=1) for end in (left, right)], axis=0)
         wide: np.ndarray = longer > largest_ratio * shorter
         wide |= np.einsum("ij,ij->i", left, right) < 0
-        return wide & (last > first)
+        wide &= last > first
+        return wide if also is None else wide | also(origin, first, last)
 
     spans = np.arange(len(raster.length))
     cut = int(np.count_nonzero(differs(spans, np.zeros_like(spans), raster.length.astype(np.int64) - 1)))
@@ -234,9 +248,12 @@ def cut_by_ends(raster: Raster, largest_ratio: float) -> tuple[Raster, int]:
     return whole, cut
 
 
-def split_pairs(raster: Raster) -> Raster:
-    """Divide each span of two pixels into two spans, for a method that takes vectors. Other spans stay."""
-    return _halve(raster, lambda _, first, last: last - first == 1)[0]
+def split_pairs(raster: Raster, also: _Criterion | None = None) -> Raster:
+    """Divide each span of two pixels into two spans, for a method that takes vectors. Other spans stay.
+
+    ``also`` halves spans for another reason, as in `cut_by_angle`.
+    """
+    return _halve(raster, lambda _, first, last: last - first == 1, also)[0]
 
 
 def _normals(raster: Raster, span: np.ndarray, place: np.ndarray) -> np.ndarray:
@@ -246,8 +263,8 @@ def _normals(raster: Raster, span: np.ndarray, place: np.ndarray) -> np.ndarray:
     return np.where(line.any(axis=1, keepdims=True), normalise(line), raster.normal_left[span])
 
 
-def _halve(raster: Raster, is_wide: Callable[..., np.ndarray]) -> tuple[Raster, int]:
-    """Halve spans while ``is_wide(span, first pixel, last pixel)``.
+def _halve(raster: Raster, is_wide: _Criterion, also: _Criterion | None = None) -> tuple[Raster, int]:
+    """Halve spans while ``is_wide(span, first pixel, last pixel)`` or ``also`` of the same.
 
     Also returns the number of halved spans.
     """
@@ -259,6 +276,8 @@ def _halve(raster: Raster, is_wide: Callable[..., np.ndarray]) -> tuple[Raster, 
         wide = np.zeros(len(origin), dtype=bool)
         for part in chunks(len(origin)):
             wide[part] = is_wide(origin[part], first[part], last[part])
+            if also is not None:
+                wide[part] |= also(origin[part], first[part], last[part])
         settled.append((origin[~wide], first[~wide], last[~wide]))
         origin, first, last = origin[wide], first[wide], last[wide]
         middle = (first + last + 1) // 2
@@ -304,7 +323,11 @@ def _parts(raster: Raster, origin: np.ndarray, first: np.ndarray, last: np.ndarr
 
 
 def cut_by_error(
-    scene: Scene, raster: Raster, interpolator: Interpolator, limits: HighlightLimits | None = None
+    scene: Scene,
+    raster: Raster,
+    interpolator: Interpolator,
+    limits: HighlightLimits | None = None,
+    also: _Criterion | None = None,
 ) -> tuple[Raster, int]:
     """Halve spans until the method's curve is near enough to the exact curve for every light.
 
@@ -335,6 +358,8 @@ def cut_by_error(
         The method.
     limits : HighlightLimits, optional
         Tolerances of the materials' highlights. By default they follow from the exponents.
+    also : callable, optional
+        As for `cut_by_angle`.
 
     Returns
     -------
@@ -353,4 +378,4 @@ def cut_by_error(
         wide[rest] = pieces.miss(interpolator, limits, material[rest])
         return wide
 
-    return _halve(raster, is_wide)
+    return _halve(raster, is_wide, also)

@@ -22,6 +22,8 @@ from blysk.golden.reference.reflection import BLINN
 from blysk.golden.reference.scene import Scene
 from blysk.golden.reference.texture import Texture
 
+from .cuts import origins
+
 NOISE = np.random.default_rng(2).random((64, 64, 3))
 CHECKER = np.repeat(np.indices((64, 64)).sum(axis=0)[..., np.newaxis] // 2 % 2, 3, axis=2).astype(float)
 
@@ -104,6 +106,19 @@ def test_bounds_by_tolerance_hold(method):
         design = replace(design_for(preset(method, "blinn", lights=2), scene), transfer=transfer)
         found = compare(scene, design, model_frame(scene, design))
         assert 0.5 < found.method_error.steady_lsb <= found.bound_lsb < (1.2 if transfer == "linear" else 6)
+
+
+@pytest.mark.parametrize("method", ["quotient", "renormalise", "linear", "chord-local"])
+def test_a_span_that_is_cut_for_two_reasons_counts_once(method):
+    image = np.random.default_rng(5).random((512, 512, 3))
+    scene = scene_of("perspective", Texture(image, mipmapped=False), tiles=0.3)
+    prepared = prepare(scene, design_for(preset(method, "blinn", lights=2), scene))
+    parts = np.bincount(origins(prepared.raster, prepared.cut_raster)[0])
+    # With quotient a span of two pixels is always two parts, and counts only if its ends differ.
+    pairs = prepared.raster.length[parts > 1] == 2 if method == "quotient" else np.zeros(1)
+    assert 0 <= (parts > 1).sum() - prepared.spans_cut <= pairs.sum()
+    _, by_attributes = cut_by_attributes(scene, prepared.raster)
+    assert by_attributes <= prepared.spans_cut
 
 
 @pytest.mark.parametrize("wraps", [("clamp", "mirror"), ("repeat", "clamp")])
