@@ -106,7 +106,7 @@ class ShadingPipeline:
             raise ValueError(f"materials must be 1 to {MAX_MATERIALS}, not {self.materials}")
         if self.loads_tables:
             self._check_lobe()
-        if self.gate and not (self.specular and self.lights):
+        if self.gate and not self.has_highlights:
             raise ValueError("without specular light there is nothing to gate")
         if self.gate and not self.interpolator.serves_gate:
             raise ValueError(f"method {self.method} has no error bound for a gate")
@@ -115,7 +115,7 @@ class ShadingPipeline:
                 raise ValueError(f"{name} must be {least} to {LENGTH_BITS}, not {getattr(self, name)}")
         if self.transfer not in TRANSFERS:
             raise ValueError(f"transfer must be one of {', '.join(TRANSFERS)}, not {self.transfer!r}")
-        if self.albedo is not None and self.albedo.tints and not (self.specular and self.lights):
+        if self.albedo is not None and self.albedo.tints and not self.has_highlights:
             raise ValueError("an albedo with tints needs specular light")
         if self.texels_outside and (self.build.pipes > 1 or self.build.bus != "native"):
             option = "pipes" if self.build.pipes > 1 else "bus"
@@ -200,6 +200,11 @@ class ShadingPipeline:
     def model(self) -> str | None:
         """Name of the reflection model; ``None`` without specular light."""
         return self.specular.name if self.specular else None
+
+    @property
+    def has_highlights(self) -> bool:
+        """Whether a pixel has specular light: there are a reflection model and a light."""
+        return self.specular is not None and self.lights > 0
 
     @property
     def mirror(self) -> bool:

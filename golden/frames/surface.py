@@ -77,7 +77,7 @@ def design_for(design: ShadingPipeline, scene: Scene, scaled: bool = True) -> Sh
         If the textures do not fit the largest texel memory.
     """
     albedo = albedo_of(scene)
-    if albedo is not None and not (design.specular and design.lights):
+    if albedo is not None and not design.has_highlights:
         albedo = replace(albedo, tints=False)
     return replace(design.for_materials(scene.materials, scaled), albedo=albedo)
 
@@ -91,7 +91,7 @@ def check_albedo(scene: Scene, design: ShadingPipeline) -> None:
         If the design lacks a part that the scene needs.
     """
     albedo = design.albedo
-    tinted = any(of.tinted for of in scene.materials) and bool(design.specular and design.lights)
+    tinted = any(of.tinted for of in scene.materials) and design.has_highlights
     for what, needed, there in (
         ("vertex colours", bool(scene.mesh.colors.size), albedo is not None and albedo.colors),
         ("textures", bool(scene.textures), albedo is not None and albedo.texture is not None),

@@ -221,6 +221,8 @@ def test_files_of_the_site(site):
     assert f"cut for the exponent {', '.join(map(str, lower))} or {highest}, the smallest" in text
     data = json.loads(page.texts["site"])
     assert list(data["designs"]) == ["quotient-blinn", "quadratic-cosquad", "linear-exp"]
+    bare = all(web_data.design_of(d["method"], d["model"]).albedo is None for d in data["designs"].values())
+    assert bare == ("this page leaves out vertex colours, textures and alpha" in text)
     assert data["start"] == web_data.START
     assert data["mirrored"] == ["phong"]
     assert [len(mesh["views"]) for mesh in data["meshes"].values()] == [1, 2]
