@@ -13,8 +13,9 @@ import numpy as np
 from amaranth.lib.wiring import Component
 
 from blysk.bench.tools.defaults import SAMPLES, SEED
-from blysk.bench.units.record import Record, Sample, Variant
+from blysk.bench.units.record import Record, Variant
 from blysk.bench.units.registry import RECORDS
+from blysk.bench.units.sample import Sample
 from blysk.hdl.emit.cost import Cost, cost_of
 from blysk.sim.engines.beats import dtype_of
 from blysk.sim.engines.simulate import simulate

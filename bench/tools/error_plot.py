@@ -10,7 +10,8 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import LogLocator
 
 from blysk.bench.tools.blocks import Entry
-from blysk.bench.units.record import Decisions, Record, Sample
+from blysk.bench.units.record import Record
+from blysk.bench.units.sample import Decisions, Sample
 
 __all__ = [
     "draw_errors",

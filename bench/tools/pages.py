@@ -29,8 +29,9 @@ from blysk.bench.tools.pages_folder import MADE, PROJECT, check_folder
 from blysk.bench.tools.structure import graph_of
 from blysk.bench.tools.timing import draw_timing, waves_of
 from blysk.bench.units.names import ROOMS
-from blysk.bench.units.record import Record, Sample
+from blysk.bench.units.record import Record
 from blysk.bench.units.registry import RECORDS
+from blysk.bench.units.sample import Sample
 from blysk.hdl.core.pipelined_unit import PipelinedUnit
 from blysk.sim.output import write_text
 

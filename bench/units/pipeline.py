@@ -33,7 +33,8 @@ from blysk.bench.units.pipeline_spans import (
     spans_near_terminator,
     tabled,
 )
-from blysk.bench.units.record import Case, Record, Sample, Stimulus, Variant, first, once, together
+from blysk.bench.units.record import Case, Record, Stimulus, Variant, first, once, together
+from blysk.bench.units.sample import Sample
 from blysk.golden.albedo.albedo import Albedo
 from blysk.golden.albedo.texel_memory import TexelMemory
 from blysk.golden.albedo.texture_sampler import TextureSampler

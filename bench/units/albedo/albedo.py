@@ -8,7 +8,8 @@ from blysk.bench.units.albedo.attribute_spans import quantised_spans
 from blysk.bench.units.albedo.texel_memory import loaded_words
 from blysk.bench.units.albedo.textures import any_texture, of_descriptor
 from blysk.bench.units.operands import log_lengths, short_lengths
-from blysk.bench.units.record import Case, Record, Sample, Stimulus, Variant
+from blysk.bench.units.record import Case, Record, Stimulus, Variant
+from blysk.bench.units.sample import Sample
 from blysk.golden.albedo.albedo import Albedo
 from blysk.golden.albedo.attribute_spans import SpanAttributes
 from blysk.golden.albedo.texel_memory import LoadedTextures, TexelMemory, TextureDescriptor

@@ -5,7 +5,8 @@ from functools import partial
 import numpy as np
 
 from blysk.bench.units.operands import any_codes, log_lengths, short_lengths
-from blysk.bench.units.record import Case, Record, Sample, Stimulus, Variant
+from blysk.bench.units.record import Case, Record, Stimulus, Variant
+from blysk.bench.units.sample import Sample
 from blysk.golden.albedo.attribute_spans import AttributeSpans, AttributeWords, SpanAttributes
 from blysk.golden.number.spans import pixels_of
 from blysk.hdl.albedo.attribute_spans import AttributeSpansUnit

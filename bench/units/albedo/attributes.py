@@ -6,7 +6,8 @@ import numpy as np
 
 from blysk.bench.units.albedo.attribute_spans import attribute_word_beats
 from blysk.bench.units.operands import any_codes
-from blysk.bench.units.record import Case, Record, Sample, Stimulus, Variant
+from blysk.bench.units.record import Case, Record, Stimulus, Variant
+from blysk.bench.units.sample import Sample
 from blysk.golden.albedo.attribute_spans import AttributeSpans, AttributeWords
 from blysk.golden.albedo.attributes import Attributes
 from blysk.golden.number.fixed import Fixed

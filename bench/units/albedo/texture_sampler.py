@@ -7,7 +7,8 @@ import numpy as np
 
 from blysk.bench.units.albedo.texel_memory import loaded_words
 from blysk.bench.units.albedo.textures import any_places, any_texture, of_descriptor
-from blysk.bench.units.record import Case, Record, Sample, Stimulus, Variant
+from blysk.bench.units.record import Case, Record, Stimulus, Variant
+from blysk.bench.units.sample import Sample
 from blysk.golden.albedo.texel_memory import LoadedTextures, TexelMemory, TextureDescriptor
 from blysk.golden.albedo.texture_sampler import TextureSampler
 from blysk.golden.number.fixed import Fixed

@@ -20,7 +20,8 @@ from blysk.bench.units.operands import (
     vectors_near,
     word_ends,
 )
-from blysk.bench.units.record import Case, Record, Sample, Stimulus, Variant
+from blysk.bench.units.record import Case, Record, Stimulus, Variant
+from blysk.bench.units.sample import Sample
 from blysk.golden.cosines.angular_setup import AngularSetup
 from blysk.golden.cosines.arccos import ARCCOS_TABLES, SEGMENT_BOUNDS, Arccos
 from blysk.golden.number.unit_vector import COMPONENT, ONE, quantise

@@ -11,7 +11,8 @@ from blysk.bench.units.operands import (
     span_ends,
     word_ends,
 )
-from blysk.bench.units.record import Case, Record, Sample, Stimulus, Variant
+from blysk.bench.units.record import Case, Record, Stimulus, Variant
+from blysk.bench.units.sample import Sample
 from blysk.golden.cosines.chord import Chord
 from blysk.golden.number.unit_vector import COMPONENT, ONE
 from blysk.hdl.cosines.chord import ChordUnit

@@ -16,7 +16,8 @@ from blysk.bench.units.operands import (
     spread_angles,
     turned,
 )
-from blysk.bench.units.record import Case, Record, Sample, Stimulus, Variant
+from blysk.bench.units.record import Case, Record, Stimulus, Variant
+from blysk.bench.units.sample import Sample
 from blysk.golden.cosines.chord_setup import ChordSetup, SpanValues
 from blysk.golden.number.fixed import Fixed
 from blysk.golden.number.unit_vector import ONE_SQUARED

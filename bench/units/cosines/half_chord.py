@@ -5,7 +5,8 @@ from functools import partial
 import numpy as np
 
 from blysk.bench.units.operands import any_codes, dot, span_ends
-from blysk.bench.units.record import Case, Record, Sample, Stimulus, Variant
+from blysk.bench.units.record import Case, Record, Stimulus, Variant
+from blysk.bench.units.sample import Sample
 from blysk.golden.cosines.half_chord import HalfChord
 from blysk.golden.number.fixed import Fixed
 from blysk.golden.number.unit_vector import ONE

@@ -6,7 +6,8 @@ import numpy as np
 
 from blysk.bench.units.cosines.quotient_spans import pixel_word_beats
 from blysk.bench.units.operands import any_codes, word_ends
-from blysk.bench.units.record import Case, Record, Sample, Stimulus, Variant
+from blysk.bench.units.record import Case, Record, Stimulus, Variant
+from blysk.bench.units.sample import Sample
 from blysk.golden.cosines.quotient import OCTAVES, STEPS, Quotient
 from blysk.golden.cosines.quotient_spans import PixelWords, QuotientSpans
 from blysk.golden.number.fixed import Fixed

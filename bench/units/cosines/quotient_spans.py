@@ -5,7 +5,8 @@ from functools import partial
 import numpy as np
 
 from blysk.bench.units.operands import short_lengths, span_lengths, word_ends
-from blysk.bench.units.record import Case, Record, Sample, Stimulus, Variant
+from blysk.bench.units.record import Case, Record, Stimulus, Variant
+from blysk.bench.units.sample import Sample
 from blysk.golden.cosines.quotient_spans import QuotientSpans, SpanVectors
 from blysk.golden.number.spans import pixels_of
 from blysk.hdl.cosines.quotient_spans import QuotientSpansUnit

@@ -5,7 +5,8 @@ from functools import partial
 import numpy as np
 
 from blysk.bench.units.operands import LONG, log_lengths, short_lengths, spread_angles
-from blysk.bench.units.record import Case, Record, Sample, Stimulus, Variant
+from blysk.bench.units.record import Case, Record, Stimulus, Variant
+from blysk.bench.units.sample import Sample
 from blysk.golden.cosines.recurrence import RECURRENCE_FORMS, Recurrence
 from blysk.golden.number.fixed import SQ, Fixed
 from blysk.golden.number.spans import pixels_of

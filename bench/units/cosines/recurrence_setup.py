@@ -17,7 +17,8 @@ from blysk.bench.units.operands import (
     unit_codes,
     vectors_near,
 )
-from blysk.bench.units.record import Case, Record, Sample, Stimulus, Variant
+from blysk.bench.units.record import Case, Record, Stimulus, Variant
+from blysk.bench.units.sample import Sample
 from blysk.golden.cosines.recurrence import Recurrence
 from blysk.golden.cosines.recurrence_setup import RecurrenceSetup
 from blysk.golden.number.fixed import SQ

@@ -4,7 +4,8 @@ from functools import partial
 
 import numpy as np
 
-from blysk.bench.units.record import Case, Record, Sample, Stimulus, Variant, first
+from blysk.bench.units.record import Case, Record, Stimulus, Variant, first
+from blysk.bench.units.sample import Sample
 from blysk.bench.units.triangles import WHOLE, Stages, random_triangles, scales_of
 from blysk.golden.geometry.gradient_setup import GradientSetup
 from blysk.golden.geometry.triangles import ATTRIBUTE

@@ -3,7 +3,8 @@
 import numpy as np
 
 from blysk.bench.units.operands import any_codes, component_words, degrees_between, sphere, turned, unit_codes
-from blysk.bench.units.record import Case, Record, Sample, Stimulus, Variant
+from blysk.bench.units.record import Case, Record, Stimulus, Variant
+from blysk.bench.units.sample import Sample
 from blysk.golden.geometry.halfway_vector import HalfwayVector
 from blysk.golden.number.unit_vector import COMPONENT, ONE, quantise
 from blysk.golden.reference.lighting import halfway_vector

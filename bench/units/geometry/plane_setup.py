@@ -4,7 +4,8 @@ from functools import partial
 
 import numpy as np
 
-from blysk.bench.units.record import Case, Record, Sample, Stimulus, Variant, first
+from blysk.bench.units.record import Case, Record, Stimulus, Variant, first
+from blysk.bench.units.sample import Sample
 from blysk.bench.units.triangles import WHOLE, Stages, plane_corners, random_triangles, scales_of_corners
 from blysk.golden.geometry.triangles import GRID, Grid
 from blysk.hdl.geometry.plane_setup import PlaneSetupUnit

@@ -5,7 +5,8 @@ from functools import partial
 import numpy as np
 
 from blysk.bench.units.operands import any_codes, sphere
-from blysk.bench.units.record import Case, Record, Sample, Stimulus, Variant
+from blysk.bench.units.record import Case, Record, Stimulus, Variant
+from blysk.bench.units.sample import Sample
 from blysk.golden.geometry.span_attributes import SPAN_NORMAL
 from blysk.golden.geometry.vector_normaliser import VectorNormaliser
 from blysk.golden.normals.dot_product import DotProduct

@@ -3,7 +3,8 @@
 from functools import partial
 
 from blysk.bench.units.operands import any_codes
-from blysk.bench.units.record import Case, Record, Sample, Stimulus, Variant
+from blysk.bench.units.record import Case, Record, Stimulus, Variant
+from blysk.bench.units.sample import Sample
 from blysk.golden.lighting.factor import Factor
 from blysk.golden.number.fixed import Fixed
 from blysk.hdl.lighting.factor import FactorUnit

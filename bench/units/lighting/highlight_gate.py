@@ -13,7 +13,8 @@ from blysk.bench.units.operands import (
     spread_angles,
     turned,
 )
-from blysk.bench.units.record import Case, Decisions, Record, Stimulus, Variant
+from blysk.bench.units.record import Case, Record, Stimulus, Variant
+from blysk.bench.units.sample import Decisions
 from blysk.golden.lighting.highlight_gate import HighlightGate
 from blysk.golden.lighting.specular import Specular
 from blysk.golden.methods.quadratic_interpolator import QuadraticInterpolator

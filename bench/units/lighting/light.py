@@ -14,7 +14,8 @@ from blysk.bench.units.operands import (
     spread_angles,
     turned,
 )
-from blysk.bench.units.record import Case, Record, Sample, Stimulus, Variant
+from blysk.bench.units.record import Case, Record, Stimulus, Variant
+from blysk.bench.units.sample import Sample
 from blysk.golden.lighting.diffuse import Diffuse
 from blysk.golden.lighting.factor import Factor
 from blysk.golden.lighting.power import Power

@@ -7,7 +7,8 @@ import numpy as np
 
 from blysk.bench.units.lighting.specular import any_exponent
 from blysk.bench.units.operands import any_codes, exponents
-from blysk.bench.units.record import Case, Record, Sample, Stimulus, Variant, together
+from blysk.bench.units.record import Case, Record, Stimulus, Variant, together
+from blysk.bench.units.sample import Sample
 from blysk.golden.lighting.lobe import Lobe, LobeTable
 from blysk.golden.lighting.quotient_lobe import QuotientLobe
 from blysk.golden.number.fixed import Fixed

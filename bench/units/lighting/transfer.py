@@ -4,7 +4,8 @@ from functools import partial
 
 import numpy as np
 
-from blysk.bench.units.record import Case, Record, Sample, Stimulus, Variant
+from blysk.bench.units.record import Case, Record, Stimulus, Variant
+from blysk.bench.units.sample import Sample
 from blysk.golden.lighting.transfer import Transfer
 from blysk.golden.number.fixed import Fixed
 from blysk.golden.reference.transfer import encode

@@ -19,7 +19,8 @@ from blysk.bench.units.operands import (
     turned,
     unit_codes,
 )
-from blysk.bench.units.record import Case, Record, Sample, Stimulus, Variant
+from blysk.bench.units.record import Case, Record, Stimulus, Variant
+from blysk.bench.units.sample import Sample
 from blysk.golden.methods.interpolator import Interpolator, Operands
 from blysk.golden.number.spans import pixels_of
 from blysk.golden.number.unit_vector import ONE, quantise

@@ -18,7 +18,8 @@ from blysk.bench.units.cosines.chord_setup import (
 from blysk.bench.units.cosines.chord_setup import RECORD as SETUP
 from blysk.bench.units.methods.interpolator import long_lengths, of_setup, operand_beats, options
 from blysk.bench.units.operands import any_codes, short_lengths, span_lengths
-from blysk.bench.units.record import Case, Record, Sample, Stimulus, Variant
+from blysk.bench.units.record import Case, Record, Stimulus, Variant
+from blysk.bench.units.sample import Sample
 from blysk.golden.methods.local_chord_interpolator import LocalChordInterpolator
 from blysk.golden.number.spans import pixels_of
 from blysk.golden.number.unit_vector import ONE_SQUARED

@@ -16,7 +16,8 @@ from blysk.bench.units.operands import (
     turned,
     unit_codes,
 )
-from blysk.bench.units.record import Case, Record, Sample, Stimulus, Variant
+from blysk.bench.units.record import Case, Record, Stimulus, Variant
+from blysk.bench.units.sample import Sample
 from blysk.golden.methods.renormalise_interpolator import RenormaliseInterpolator
 from blysk.golden.normals.line_setup import quantise_line
 from blysk.golden.number.fixed import Fixed

@@ -15,7 +15,8 @@ from blysk.bench.units.operands import (
     span_ends,
     span_lengths,
 )
-from blysk.bench.units.record import Case, Record, Sample, Stimulus, Variant
+from blysk.bench.units.record import Case, Record, Stimulus, Variant
+from blysk.bench.units.sample import Sample
 from blysk.golden.normals.adaptive_normaliser import AdaptiveNormaliser
 from blysk.golden.normals.bisection import Bisection
 from blysk.golden.number.spans import pixels_of

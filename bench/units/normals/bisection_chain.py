@@ -16,7 +16,8 @@ from blysk.bench.units.operands import (
     span_ends,
     word_ends,
 )
-from blysk.bench.units.record import Case, Record, Sample, Stimulus, Variant
+from blysk.bench.units.record import Case, Record, Stimulus, Variant
+from blysk.bench.units.sample import Sample
 from blysk.golden.normals.bisection import Bisection
 from blysk.golden.normals.bisection_chain import BisectionChain
 from blysk.golden.normals.dot_product import DotProduct

@@ -3,7 +3,8 @@
 import numpy as np
 
 from blysk.bench.units.operands import SPANS_45, any_codes, curves, log_lengths, pixel_of, short_lengths
-from blysk.bench.units.record import Case, Record, Sample, Stimulus, Variant
+from blysk.bench.units.record import Case, Record, Stimulus, Variant
+from blysk.bench.units.sample import Sample
 from blysk.golden.normals.difference_accumulator import DifferenceAccumulator
 from blysk.golden.normals.difference_setup import DifferenceSetup
 from blysk.golden.number.fixed import Fixed

@@ -5,7 +5,8 @@ from functools import partial
 import numpy as np
 
 from blysk.bench.units.operands import LONG, SPANS_45, any_curves, any_lengths, curves, log_lengths, pixel_of
-from blysk.bench.units.record import Case, Record, Sample, Stimulus, Variant
+from blysk.bench.units.record import Case, Record, Stimulus, Variant
+from blysk.bench.units.sample import Sample
 from blysk.golden.normals.difference_setup import DifferenceSetup
 from blysk.golden.normals.gpq import GPQ
 from blysk.golden.number.fixed import Fixed

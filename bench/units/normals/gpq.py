@@ -11,7 +11,8 @@ from blysk.bench.units.operands import (
     span_ends,
     word_ends,
 )
-from blysk.bench.units.record import Case, Record, Sample, Stimulus, Variant
+from blysk.bench.units.record import Case, Record, Stimulus, Variant
+from blysk.bench.units.sample import Sample
 from blysk.golden.normals.gpq import GPQ
 from blysk.golden.normals.middle_normal import MAX_SPAN_ANGLE, MiddleNormal
 from blysk.golden.number.fixed import Fixed

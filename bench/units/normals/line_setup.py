@@ -5,7 +5,8 @@ from functools import partial
 import numpy as np
 
 from blysk.bench.units.operands import LONG, any_codes, any_lengths, log_lengths, pixel_of, sphere
-from blysk.bench.units.record import Case, Record, Sample, Stimulus, Variant
+from blysk.bench.units.record import Case, Record, Stimulus, Variant
+from blysk.bench.units.sample import Sample
 from blysk.golden.normals.line_setup import LineSetup, quantise_line
 from blysk.golden.number.fixed import Fixed
 from blysk.hdl.normals.line_setup import LineSetupUnit

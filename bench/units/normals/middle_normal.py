@@ -15,7 +15,8 @@ from blysk.bench.units.operands import (
     span_ends,
     word_ends,
 )
-from blysk.bench.units.record import Case, Record, Sample, Stimulus, Variant
+from blysk.bench.units.record import Case, Record, Stimulus, Variant
+from blysk.bench.units.sample import Sample
 from blysk.golden.normals.middle_normal import MAX_SPAN_ANGLE, MIDDLE_NORMAL_FITS, MiddleNormal
 from blysk.golden.number.unit_vector import COMPONENT, ONE_SQUARED
 from blysk.hdl.normals.middle_normal import MiddleNormalUnit

@@ -16,7 +16,8 @@ from blysk.bench.units.operands import (
     pixel_of,
     short_lengths,
 )
-from blysk.bench.units.record import Case, Record, Sample, Stimulus, Variant
+from blysk.bench.units.record import Case, Record, Stimulus, Variant
+from blysk.bench.units.sample import Sample
 from blysk.golden.normals.gpq import GPQ
 from blysk.golden.normals.quadratic_evaluator import QUADRATIC_FORMS, QuadraticEvaluator
 from blysk.golden.number.fixed import Fixed

@@ -3,7 +3,8 @@
 import numpy as np
 
 from blysk.bench.units.operands import any_codes, sphere
-from blysk.bench.units.record import Case, Record, Sample, Stimulus, Variant
+from blysk.bench.units.record import Case, Record, Stimulus, Variant
+from blysk.bench.units.sample import Sample
 from blysk.golden.normals.renormaliser import Renormaliser
 from blysk.golden.number.fixed import Fixed
 from blysk.golden.number.unit_vector import ONE

@@ -4,7 +4,8 @@ from functools import cache, partial
 
 import numpy as np
 
-from blysk.bench.units.record import Case, Record, Sample, Stimulus, Variant
+from blysk.bench.units.record import Case, Record, Stimulus, Variant
+from blysk.bench.units.sample import Sample
 from blysk.bench.units.video.meshes import any_memory
 from blysk.golden.reference.camera import Camera
 from blysk.golden.video.motion import ANGLE_BITS, ENTRIES, Motion, rotation

@@ -10,8 +10,9 @@ import pytest
 
 from blysk.bench.tools import blocks
 from blysk.bench.tools.blocks import ENTRIES, Entry, entry_of, rows, sample_of, table
-from blysk.bench.units.record import Decisions, Record, Sample, Variant
+from blysk.bench.units.record import Record, Variant
 from blysk.bench.units.registry import RECORDS
+from blysk.bench.units.sample import Decisions, Sample
 from blysk.golden.cosines.angular_setup import AngularSetup
 from blysk.golden.geometry.gradient_setup import GradientSetup
 from blysk.golden.number.fixed import Fixed

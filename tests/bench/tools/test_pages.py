@@ -15,8 +15,9 @@ from blysk.bench.tools.error_plot import draw_errors
 from blysk.bench.tools.graph import Graph, Node, likeness
 from blysk.bench.tools.pages import write_pages
 from blysk.bench.tools.pages_folder import PROJECT
-from blysk.bench.units.record import Decisions, Record, Sample, Variant
+from blysk.bench.units.record import Record, Variant
 from blysk.bench.units.registry import RECORDS
+from blysk.bench.units.sample import Decisions, Sample
 from blysk.sim.errors import InputError
 
 # Docstrings.
