@@ -19,10 +19,11 @@ from matplotlib.figure import Figure
 from PIL import Image
 
 from blysk.bench.cli.bench import command
-from blysk.bench.report import frames, points
+from blysk.bench.report import criteria, frames, geometry, needs, points, stability
 from blysk.bench.report.section import Drawing, Section, Table
 from blysk.bench.store import Task
 from blysk.bench.svg import svg
+from blysk.golden.presets import METHODS
 from blysk.sim.cli.main import main
 
 DESIGNS = [*points.DESIGNS[:10], ("renormalise", "exp"), ("renormalise", "blinn_product"), points.DESIGNS[-1]]
@@ -237,10 +238,33 @@ def plain_section():
     )
 
 
+FEW_METHODS = "quotient", "renormalise", "linear"
+FEW = {
+    points: {
+        "DESIGNS": [("quotient", "blinn"), ("renormalise", "cosquad"), ("angular-published", "cosquad")],
+        "METHODS": {name: METHODS[name] for name in FEW_METHODS},
+        "BEST": ["linear"],
+        "QUICK_SIMULATED": [("quotient", "blinn")],
+    },
+    stability: {"METHODS": {name: METHODS[name] for name in FEW_METHODS}},
+    needs: {"QUICK_SCENES": ("teapot in ambient light",)},
+    criteria: {
+        "METHODS": {name: METHODS[name] for name in FEW_METHODS[:2]},
+        "_TRIANGLES": criteria._TRIANGLES[:3],
+    },
+    geometry: {"_QUICK": geometry._QUICK[:1]},
+}
+"""What the sections of `quick_report` measure; their own tests measure the rest."""
+
+
 @pytest.fixture(scope="session")
 def quick_report(tmp_path_factory):
-    """Folder of ``blysk bench --quick``: minutes."""
+    """Folder of ``blysk bench --quick`` with all sections and kinds of measurement, of few designs each."""
     folder = tmp_path_factory.mktemp("quick") / "report"
-    result = CliRunner().invoke(command, [str(folder), "--quick"], catch_exceptions=False)
+    with pytest.MonkeyPatch.context() as patch:
+        for section, values in FEW.items():
+            for name, value in values.items():
+                patch.setattr(section, name, value)
+        result = CliRunner().invoke(command, [str(folder), "--quick"], catch_exceptions=False)
     assert result.exit_code == 0, result.output
     return folder
