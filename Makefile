@@ -16,12 +16,17 @@ TEST_EXTRAS := $(if $(shell command -v c++ || command -v g++ || command -v clang
 LINT := import tomllib; of = tomllib.load(open("pyproject.toml", "rb"))["project"]; \
 	print(*of["optional-dependencies"]["lint"], *(one for one in of["dependencies"] if one.startswith(("click", "numpy"))), sep="\n")
 
-.PHONY: demo test test-all test-long test-ci prove prove-ci decided mutants soak coverage bench pages site lint clean
+.PHONY: demo test test-quick test-all test-long test-ci prove prove-ci decided mutants soak coverage bench pages site \
+	lint style types clean
 
 demo: $(VENV)/.installed
 	$(BIN)/blysk render teapot --size 640x480 --compare teapot.png
 
-test: $(VENV)/.installed-test lint
+# Style at once; types, which one core checks in most of a minute, beside the tests.
+test: $(VENV)/.installed-test style
+	$(MAKE) --no-print-directory -j2 test-quick types
+
+test-quick: $(VENV)/.installed-test
 	$(BIN)/python -m pytest -n $(TEST_WORKERS) --no-loadscope-reorder
 
 test-all:
@@ -77,10 +82,14 @@ pages: $(VENV)/.installed
 site: pages $(VENV)/.installed-web
 	$(BIN)/blysk web -o site --pages build/pages
 
-# Types are checked under the import name, which the folders have by links.
-lint: $(VENV)/.installed-lint
+lint: style types
+
+style: $(VENV)/.installed-lint
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
+
+# Types are checked under the import name, which the folders have by links.
+types: $(VENV)/.installed-lint
 	@mkdir -p build/types/blysk
 	@ln -sf ../../../golden ../../../hdl ../../../sim ../../../blysk/__init__.py build/types/blysk
 	MYPYPATH=build/types $(BIN)/mypy -p blysk.golden -p blysk.sim.api
