@@ -68,5 +68,6 @@ def test_colours_of_files(tmp_path, name, write, options, projection):
     frame = render(scene)
     sure = seen.hit & (seen.margin > SURE)
     assert sure.sum() > 0.9 * frame.mask.sum() > 1000
-    assert np.abs(255 * frame.image - seen.color)[sure].max() < 1e-7
+    # Of texts trimesh keeps numbers of single precision.
+    assert np.abs(255 * frame.image - seen.color)[sure].max() < 1e-4
     assert np.ptp(seen.color[sure], axis=0).min() > 100
