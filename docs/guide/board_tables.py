@@ -1,7 +1,7 @@
-"""Fill in the tables of ``board.md`` from ``board.json``, of ``blysk board --record``, and from `BOARDS`.
+"""Fill in the tables of ``board.md`` from ``board.json`` (of ``blysk board --record``) and from `BOARDS`.
 
 python docs/guide/board_tables.py            # write the tables
-python docs/guide/board_tables.py --check    # change nothing; fail where the page is not what comes out
+python docs/guide/board_tables.py --check    # change nothing; fail if the page has other tables
 """
 
 import argparse
@@ -29,7 +29,7 @@ _OTHERS = (
     ),
     ("PixelForge", "Cyclone V", "not stated", "not stated", "at vertices, no highlight"),
 )
-"""The others' own figures: theory/references.md#other-hardware."""
+"""Figures of other designs as their authors publish them, see theory/references.md#other-hardware."""
 
 
 def main(arguments: Sequence[str]) -> int:
@@ -55,18 +55,18 @@ def _rows(head: Sequence[str], rows: Sequence[Sequence[str]], left: int = 1) -> 
 
 
 def _named(entry: str) -> tuple[str, str]:
-    """Board and triangles of an entry's name."""
+    """Board, and number of triangles as text, from the name of an entry."""
     board, _, triangles = entry.split(", ")
     return board, triangles.removesuffix(" triangles")
 
 
 def _known(entries: dict) -> Iterator[str]:
-    """What is known of the bitstream of each board, from its record."""
+    """Table of what is known of each board's bitstream."""
     return _rows(["board", "bitstream"], [[name, board.known] for name, board in BOARDS.items()], left=2)
 
 
 def _parts(entries: dict) -> Iterator[str]:
-    """Parts and clocks of the bitstreams."""
+    """Table of parts and clocks of the bitstreams."""
     built = {_named(entry)[0]: values["built"] for entry, values in entries.items() if "built" in values}
     if not built:
         return iter(["(no bitstream is recorded)"])
@@ -86,7 +86,7 @@ def _parts(entries: dict) -> Iterator[str]:
 
 
 def _simulated(entries: dict) -> Iterator[tuple[str, str, dict, float]]:
-    """Board, triangles, figures, and cycles of a frame at 60 Hz, of each simulation."""
+    """For each simulation: board, triangles, figures, and the cycles that 60 Hz leave for a frame."""
     for entry, values in entries.items():
         if "simulated" in values:
             figures = values["simulated"]
@@ -95,7 +95,7 @@ def _simulated(entries: dict) -> Iterator[tuple[str, str, dict, float]]:
 
 
 def _frames(entries: dict) -> Iterator[str]:
-    """Cycles and frames a second."""
+    """Table of cycles and frames a second."""
     rows = [
         [
             *(board, triangles, f"{figures['clock']:.1f} MHz", f"{figures['cycles']:,}"),
@@ -117,7 +117,7 @@ def _frames(entries: dict) -> Iterator[str]:
 
 
 def _others(entries: dict) -> Iterator[str]:
-    """Frames a second of this design and of others."""
+    """Table of frames a second of this design and of other designs."""
     rows = [
         [
             *("this design", f"{board}, {figures['clock']:.1f} MHz", triangles),
