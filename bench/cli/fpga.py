@@ -66,7 +66,7 @@ _DESIGN = DESIGN | {"transfer": DESIGN["transfer"]._replace(default="linear")}
 @click.option(
     "--by-unit",
     is_flag=True,
-    help="Print the mapped parts of each unit inside, without placement and clock rate.",
+    help="Print the mapped parts of each inner unit, without placement and clock rate.",
 )
 @click.option(
     "--json",
@@ -99,7 +99,7 @@ def command(
 
     The first line has the parts of the FPGA. Clock rates are in MHz, over the seeds. The slowest path is from
     the slowest seed: the delay in cells, the delay between cells, and the registers at both ends. The cache
-    keeps earlier placements. On ECP5 registers beside a multiplier move into the multiplier. The tool does
+    keeps earlier placements. On ECP5, registers beside a multiplier move into the multiplier. The tool does
     not time paths between registers on both sides of a multiplier. Lines below the table name these designs.
 
     \b
@@ -128,7 +128,7 @@ def command(
     if unknown:
         raise InputError(f"--unit {unknown[0]}", "unknown unit", f"use {', '.join(UNITS)}")
     if not units:
-        # With --every-method the options are checked with the default method, because it serves each core.
+        # With --every-method the options are checked with the default method, which serves each core.
         built(design(**chosen), build)
     several = build.get("pipes", 1) > 1
     family = DEVICES[family_name] if family_name else ECP5_85F if several else ECP5

@@ -105,7 +105,7 @@ ENTRIES: dict[str, Callable[[], dict[str, int]]] = _entries()
 
 Entries ``frames`` have `cycles_of` a pipeline. There are the pipelines of each method in both styles, and
 some with a gate. Entries ``parts`` have `Cost.totals` of these pipelines, of a pipeline of each model, of
-true Phong, and of every measured variant of every other unit.
+``quotient`` with ``phong``, and of every measured variant of every other unit.
 """
 
 

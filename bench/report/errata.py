@@ -146,7 +146,7 @@ def second_lobe() -> Pair:
 
 
 def shortcut(degrees: float) -> Pair:
-    """``1 - cos d`` by the published shortcut, divided by the exact value, for a span's angle; and 1."""
+    """Two ratios for a span's angle: ``1 - cos d`` by the published shortcut over the exact value, and 1."""
     angle, steps = math.radians(degrees), 1000
     exact = 2 * math.sin(angle / steps / 2) ** 2
     return float((1 - shortcut_cosine(angle, steps)) / exact), 1.0
@@ -224,7 +224,7 @@ def scaled_in_place() -> Pair:
 
 
 def wrong_variable() -> Pair:
-    """Largest error of ``P0 x + P1 y + P2`` at three corners: with ``P1 x`` for ``P1 y``, and right."""
+    """Largest error of ``P0 x + P1 y + P2`` at three corners: with ``P1 x`` for ``P1 y``, and as written."""
     corners = np.array([[0.0, 0, 1], [1, 0, 1], [0, 1, 1]])
     values = np.array([0.2, 0.4, 0.9])
     plane = np.linalg.solve(corners, values)

@@ -61,7 +61,7 @@ class Table:
 
 @dataclass(frozen=True)
 class Drawing:
-    """A drawing, and the figures in it.
+    """A drawing, with its title and a note.
 
     Parameters
     ----------

@@ -135,8 +135,7 @@ def _matrix(name, title, methods, worst, note) -> Table:
         title,
         ["group", "extreme quantity", *methods],
         [[group, text, *(worst[group, method][0] for method in methods)] for group, text in GROUPS.items()],
-        "Worst case of each group. The colour shows the error. §: stated or flagged. !: nothing tells. "
-        f"{note}",
+        f"Worst case of each group. The colour shows the error. §: stated or flagged. !: neither. {note}",
         [["", "", *(colored(group, method) for method in methods)] for group in GROUPS],
         [["", "", *(marked(group, method) for method in methods)] for group in GROUPS],
     )

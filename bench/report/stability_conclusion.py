@@ -22,9 +22,9 @@ def _cases(groups: Mapping[str, Sequence[dict]]) -> Iterator[dict]:
 
 
 def _worst(groups: Mapping[str, Sequence[dict]]) -> tuple[float, str, str]:
-    """Largest error inside the range in spans without a flag, and its case and grade.
+    """Largest error inside the range in spans without a flag, with its case and its grade.
 
-    The spans are cut, or served whole.
+    These are spans after cuts, and given spans that the method serves whole.
     """
     errors = [
         *(
@@ -157,9 +157,9 @@ def _drawing(
     left.set_yticklabels(methods)
     right.set_yticklabels([""] * len(methods))
     note = (
-        "Left: largest errors of each method. A filled mark is the worst case inside the range, with spans "
-        "cut or served whole, without the cases of the terminator. A bar is the worst case with them: there "
-        "a bright highlight of a small exponent ends within a pixel. An open mark is the worst uncut span "
+        "Left: largest errors of each method. A filled mark is the worst case inside the range, without the "
+        "cases of the terminator. In these cases a bright highlight of a small exponent ends within a pixel. "
+        "A bar is the worst case of all cases inside the range. An open mark is the worst uncut span "
         f"without a flag, also outside the range. The dashed line is {GOOD:g} LSB. Right: the widest span, "
         "from the smallest exponent to the largest."
     )

@@ -214,7 +214,7 @@ def _angles(raster: Raster) -> np.ndarray:
 
 
 def _line_angles(spans: Spans) -> np.ndarray:
-    """Angles, in degrees, of spans with unit normals whose chord is as near to 0 as the line of each span."""
+    """For each line, the angle in degrees of a chord of the unit sphere at the same distance from 0."""
     left, right = (
         codes / Renormaliser.VECTOR_FORMAT.max_code for codes in (spans.normal_left, spans.normal_right)
     )
@@ -278,7 +278,7 @@ def measure_case(case: Case, method: str) -> dict[str, Any]:
     - fair if it is larger, but the pipeline flags the span, or the method serves the span and states the
       error. A stated error is at most the error of the method's curve in float64, plus the error bounds of
       its units. In a highlight the bounds count times the exponent;
-    - bad if it is larger, and nothing tells of it.
+    - bad if it is larger, and neither a flag nor a stated error tells of it.
 
     A method serves a span that `cut_spans` leaves whole. A method that takes two normals and has no span
     limit serves spans up to its `Interpolator.widest_span`. Normals have length 1 within `LENGTH_TOLERANCE`.

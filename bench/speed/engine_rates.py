@@ -43,7 +43,7 @@ def measure(
     unit : ShadingPipelineUnit
         The pipeline.
     beats, write : mapping of field names to arrays
-        As `simulate` takes them; enough beats for some million cycles make a fair measure.
+        As in `simulate`. For a fair measure the beats should take some million cycles.
     repeats : int
         Runs of the compiled engine and of Verilator's model.
     few : int

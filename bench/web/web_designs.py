@@ -9,8 +9,10 @@ TABLES = ("blinn", "ggx")
 """Models of N·H with a table that the page's script can make."""
 
 SERVED = tuple(name for name, of in METHODS.items() if not of.given_values)
-"""Methods of modules. Methods whose spans bring values of each light are left out, because the light moves.
-The page turns vectors into the light's frame.
+"""Methods of modules.
+
+Methods whose spans bring values of each light are left out, because the light moves. If spans bring vectors,
+the page turns the vectors into the light's frame.
 """
 
 DESIGNS = (

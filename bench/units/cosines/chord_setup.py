@@ -41,7 +41,7 @@ __all__ = [
     "values_of",
 ]
 
-LOCAL = "lights and viewer 2 to 4 away, spans to 0.3 and 15 degrees"
+LOCAL = "lights and viewer at distances 2 to 4, spans to length 0.3 and 15 degrees"
 FORMATS = {"diffuse": ChordSetup.DIFFUSE_FORMAT, "highlight": ChordSetup.HIGHLIGHT_FORMAT}
 
 

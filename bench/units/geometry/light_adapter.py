@@ -69,15 +69,15 @@ RECORD = Record(
     title="Vectors of spans in the frames of further lights",
     source="docs/theory/geometry.md#normals",
     variants={
-        "": Variant(LightAdapterUnit, note="1/2 step of each component; axes of 18 bits"),
+        "": Variant(LightAdapterUnit, note="components within 1/2 step; axes of 18 bits"),
         "serial": Variant(
-            partial(LightAdapterUnit, serial=True), note="1/2 step of each component", long=True
+            partial(LightAdapterUnit, serial=True), note="components within 1/2 step", long=True
         ),
         "3 lights, serial": Variant(
-            partial(LightAdapterUnit, 3, serial=True), note="1/2 step of each component", long=True
+            partial(LightAdapterUnit, 3, serial=True), note="components within 1/2 step", long=True
         ),
         "2 lights, no highlights": Variant(
-            partial(LightAdapterUnit, 2, 1), note="1/2 step of each component", long=True
+            partial(LightAdapterUnit, 2, 1), note="components within 1/2 step", long=True
         ),
     },
     expect=_expect,

@@ -50,9 +50,9 @@ RECORD = Record(
     title="y cos a and y sin a of the vectors of spans, for highlights of R·V",
     source="docs/theory/geometry.md#normals",
     variants={
-        "": Variant(MirrorAdapterUnit, note="1/2 step of each product"),
+        "": Variant(MirrorAdapterUnit, note="products within 1/2 step"),
         "serial": Variant(
-            partial(MirrorAdapterUnit, serial=True), note="1/2 step of each product", long=True
+            partial(MirrorAdapterUnit, serial=True), note="products within 1/2 step", long=True
         ),
     },
     expect=_expect,

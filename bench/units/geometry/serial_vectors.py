@@ -45,9 +45,9 @@ RECORD = Record(
     title="Spans that come attribute by attribute, cut into pieces, as words of the quotient method",
     source="docs/theory/geometry.md#composition",
     variants={
-        "": Variant(SerialVectorsUnit, note="1/2 step of each word"),
+        "": Variant(SerialVectorsUnit, note="words within 1/2 step"),
         "several lights": Variant(
-            partial(SerialVectorsUnit, rotates=True), note="1/2 step of each word", long=True
+            partial(SerialVectorsUnit, rotates=True), note="words within 1/2 step", long=True
         ),
     },
     expect=lambda unit, case: VectorAdapter(unit.rotates).compute(_pieces(unit, case)[0]).beats,

@@ -146,12 +146,16 @@ RECORD = Record(
     title="N/W and depth at both ends of each span, and of each piece of a wide span",
     source="docs/theory/geometry.md#normals",
     variants={
-        "": Variant(SpanAttributesUnit, note="exact sums of the steps"),
-        "serial": Variant(partial(SpanAttributesUnit, serial=True), note="exact sums of the steps"),
+        "": Variant(SpanAttributesUnit, note="sums of the steps are exact"),
+        "serial": Variant(partial(SpanAttributesUnit, serial=True), note="sums of the steps are exact"),
         "serial, whole": Variant(
-            partial(SpanAttributesUnit, serial=True, whole=True), note="exact sums of the steps", long=True
+            partial(SpanAttributesUnit, serial=True, whole=True),
+            note="sums of the steps are exact",
+            long=True,
         ),
-        "whole": Variant(partial(SpanAttributesUnit, whole=True), note="exact sums of the steps", long=True),
+        "whole": Variant(
+            partial(SpanAttributesUnit, whole=True), note="sums of the steps are exact", long=True
+        ),
     },
     expect=_expect,
     status=_status,

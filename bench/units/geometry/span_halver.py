@@ -110,9 +110,9 @@ RECORD = Record(
     title="Spans cut where N/W grows too short along them",
     source="docs/theory/geometry.md#normals",
     variants={
-        "": Variant(SpanHalverUnit, note="exact means of the ends"),
+        "": Variant(SpanHalverUnit, note="means of the ends are exact"),
         "several lights": Variant(
-            partial(SpanHalverUnit, SpanHalver(rotates=True)), note="exact means of the ends", long=True
+            partial(SpanHalverUnit, SpanHalver(rotates=True)), note="means of the ends are exact", long=True
         ),
     },
     expect=_expect,

@@ -29,7 +29,7 @@ def _expect(unit, case):
     words = {name: value for name, value in case.beats.items() if name not in ("start", "shift")}
     words |= {name: Fixed(format, case.beats[name]) for name, format in _FORMATS.items() if name in words}
     words |= {name: words[name].astype(bool) for name in ("flip", "turned")}
-    # The model reads the other end only for the shift.
+    # The model reads `right` only to compute the shift. So here `right` is any vector that gives the shift.
     start = Fixed(SPAN_NORMAL, case.beats["start"])
     reach = 1 << (SPAN_NORMAL.fraction_bits - 1 - case.beats["shift"])
     right = Fixed(SPAN_NORMAL, np.repeat(reach[:, np.newaxis], 3, axis=1))
@@ -50,7 +50,7 @@ def _case(rng, **vectors):
 
 
 def _lines(unit, rng, count):
-    """N/W of all lengths at both ends of spans of 1 to 4095 pixels, and the step between the pixels."""
+    """Spans of 1 to 4095 pixels. At both ends N/W has any length, and the step leads from end to end."""
     start = sphere(rng, count) * 2.0 ** rng.uniform(-14, 0, (count, 1))
     end = start + np.linalg.norm(start, axis=1, keepdims=True) * rng.uniform(-0.5, 0.5, (count, 3))
     length = 4095 >> rng.integers(0, 12, count)
@@ -62,7 +62,7 @@ def _lines(unit, rng, count):
 
 
 def _any(unit, rng, count):
-    """Words of any codes, with extreme codes, and steps of every size."""
+    """Any codes of vectors and steps, extreme codes among them."""
     return _case(rng, **{name: any_codes(rng, _FORMATS[name], count, 3) for name in _VECTORS})
 
 
@@ -84,9 +84,9 @@ RECORD = Record(
     title="N/W at the first pixel of a span and its step, as words of the quotient method",
     source="docs/theory/geometry.md#composition",
     variants={
-        "": Variant(VectorAdapterUnit, note="1/2 step of each word; shifts are exact"),
+        "": Variant(VectorAdapterUnit, note="words within 1/2 step; shifts are exact"),
         "several lights": Variant(
-            partial(VectorAdapterUnit, VectorAdapter(rotates=True)), note="1/2 step of each word", long=True
+            partial(VectorAdapterUnit, VectorAdapter(rotates=True)), note="words within 1/2 step", long=True
         ),
     },
     expect=_expect,

@@ -71,7 +71,7 @@ def _borders(unit, rng, count):
     high = low + often(0.7, powers[1]) + rng.integers(-1, 2, (count, 2))
     pixels = np.stack([low, high, rng.integers(np.minimum(low, high), np.maximum(low, high) + 1)], axis=1)
     pixels = rng.permuted(pixels, axis=1)
-    # Any place after the centre of the pixel before, up to the centre of the pixel.
+    # Any place after the centre of the previous pixel, up to the centre of the pixel itself.
     codes = pixels * grid.steps - grid.half + 1 + rng.integers(0, grid.steps, pixels.shape)
     codes = codes.clip(grid.coordinate.min_code, grid.coordinate.max_code)
     return Case(

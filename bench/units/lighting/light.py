@@ -96,7 +96,7 @@ def _exponents(unit, rng, count):
 
 
 def _terminator(unit, rng, count):
-    """The peak of a highlight, with N·L of 0, of a single bit, or less than 0. N·L switches the highlight."""
+    """Operands at the peak of a highlight. N·L is 0, plus or minus a power of two, or the least code."""
     bits = 1 << np.arange(34)
     cosine = rng.permutation(np.r_[0, bits, -bits, _cosine_format(unit).min_code])
     highlight = np.full(len(cosine), ONE**2)

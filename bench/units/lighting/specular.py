@@ -54,7 +54,7 @@ def any_exponent(rng) -> int:
 
 
 def exponent_of(unit, constants) -> int:
-    """Exponent of a run: fixed at build time, or from the constants: the exponent itself, or its slope."""
+    """Exponent of a run. It is fixed at build time, or follows from the constants: exponent or slope."""
     if constants is None:
         return unit.exponent
     if "exponent" in constants:
@@ -181,7 +181,7 @@ _VARIANTS = dict(_models()) | dict(_others())
 
 RECORD = Record(
     name="specular",
-    title="Specular term of the cosine-quadratic model and its kin",
+    title="Specular term of the cosine-quadratic model and of related models",
     source="docs/theory/units.md#specular-unit; [T] figures 3.6 and 3.7; [C]",
     variants=_VARIANTS,
     expect=expect,

@@ -58,8 +58,8 @@ RECORD = Record(
     waivers=SETUP.waivers
     | {
         "phase_entry": (
-            "The fault changes the register only while the output is stalled. Of its word only the value is "
-            "still to be read."
+            "The fault changes the register only while the output is stalled. By then only the value in its "
+            "word is still unread."
         ),
         "recurrence_0.*": "The signal marks the last pixel of a span. Nothing reads this signal.",
     },
