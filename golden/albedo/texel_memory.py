@@ -205,7 +205,7 @@ class TexelMemory:
         return side
 
     def load(self, textures: Sequence[Texture]) -> LoadedTextures:
-        """Contents with all levels of some textures. A texture that is given twice is stored once.
+        """Contents with all levels of some textures. Textures with the same array of texels are stored once.
 
         A base is a multiple of the power of two that holds the texture. So an address is the bits of a base
         and other bits below them, without an addition.
@@ -222,18 +222,18 @@ class TexelMemory:
         """
         if not textures:
             raise ValueError("a texel memory needs a texture")
-        places: dict[int, tuple[Texture, np.ndarray]] = {}
+        places: dict[tuple[int, bool], tuple[Texture, np.ndarray]] = {}
         for texture in textures:
             levels, words = self._placed(texture)
             taken = np.zeros(words, dtype=bool)
             for first, size in levels:
                 taken[first : first + size] = True
-            places[id(texture)] = texture, taken
+            places[_stored(texture)] = texture, taken
         grids = {
             key: max(1 << (len(taken) - 1).bit_length(), _BASE_UNIT) for key, (_, taken) in places.items()
         }
         used = np.zeros(sum(grids.values()) + max(grids.values()), dtype=bool)
-        bases: dict[int, int] = {}
+        bases: dict[tuple[int, bool], int] = {}
         for key, (_, taken) in sorted(places.items(), key=lambda item: -len(item[1][1])):
             base = 0
             while (used[base : base + len(taken)] & taken).any():
@@ -250,7 +250,7 @@ class TexelMemory:
                 stride = max(image.shape[1] // 2, 1)
                 address = bases[key] + first + rows // 2 * stride + columns // 2
                 codes[address, columns % 2 + 2 * (rows % 2)] = self.encode(image)
-        return LoadedTextures(codes, tuple(_descriptor(t, bases[id(t)]) for t in textures))
+        return LoadedTextures(codes, tuple(_descriptor(t, bases[_stored(t)]) for t in textures))
 
     @staticmethod
     def _placed(texture: Texture) -> tuple[list[tuple[int, int]], int]:
@@ -288,6 +288,11 @@ class TexelMemory:
         inside = address < len(loaded.codes)
         found = loaded.codes[np.where(inside, address, 0), np.arange(BANKS)]
         return np.where(inside[..., np.newaxis], found, 0)
+
+
+def _stored(texture: Texture) -> tuple[int, bool]:
+    """Key of the levels of a texture: its array of texels, and whether it has several levels."""
+    return id(texture.texels), texture.mipmapped
 
 
 def _descriptor(texture: Texture, base: int) -> TextureDescriptor:

@@ -22,7 +22,7 @@ _COUNTS = {
     "clipped_triangles": "triangles cut at the near plane or at the ends of the grid",
     "sliver_triangles": COUNTER_TEXTS["sliver"],
     "far_triangles": "triangles beyond 1,000 times the nearest W, where surfaces 0.1 % apart may swap",
-    "hidden_spans": "spans that are wholly hidden, left out",
+    "hidden_spans": "spans without a pixel that shows, left out",
     "cut_out_pixels": "pixels dropped before the depth test, as their alpha is under the cutoff",
     "hidden_pixels": "pixels shaded behind earlier pixels",
     "dropped_pixels": COUNTER_TEXTS["dropped"],

@@ -2,6 +2,7 @@
 
 import math
 import os
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 from urllib.parse import unquote
@@ -145,8 +146,9 @@ class GltfTextures:
         ----------
         info : dict
             From `color_texture`.
-        alpha : str
-            As for `load_texture`.
+        alpha : {"told", "left out", "read"}
+            Whether alpha is recorded as not read, does not count, or is read. With "left out" the texels are
+            those of a texture with alpha.
 
         Raises
         ------
@@ -166,11 +168,16 @@ class GltfTextures:
         if "sampler" in texture:
             sampler = self._part("samplers", texture["sampler"], "a texture with the sampler")
         options = self._options(sampler)
-        options["alpha"] = alpha
+        options["alpha"] = alpha != "told"
         key = (str(image), *options.values())
         if key not in self._made:
             self._made[key] = self._texture(image, options)
-        return self._made[key]
+        made = self._made[key]
+        if alpha == "read" or made is None or not made.alpha.size:
+            return made
+        if (*key, alpha) not in self._made:
+            self._made[(*key, alpha)] = replace(made, alpha=np.zeros((0, 0)))
+        return self._made[(*key, alpha)]
 
     def _part(self, name: str, number: Any, what: str) -> dict:
         """A part of the document by its number."""

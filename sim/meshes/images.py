@@ -36,7 +36,7 @@ def load_texture(
     wrap: tuple[str, str] = ("repeat", "repeat"),
     filter: str = "bilinear",
     mipmapped: bool = True,
-    alpha: str = "told",
+    alpha: bool = False,
 ) -> Texture:
     """Texture of an image: PNG, JPEG, WebP, BMP or TGA.
 
@@ -57,9 +57,8 @@ def load_texture(
     wrap, filter, mipmapped
         See `Texture`. The texels that a resampled border needs follow from ``wrap``. An image for ``nearest``
         is enlarged without mixing the colours of neighbours.
-    alpha : {"told", "left out", "read"}
-        Whether alpha is recorded as not read, is not recorded, or is read. It is linear, and resampled as a
-        colour is.
+    alpha : bool
+        Whether alpha is read. If not, it is recorded. It is linear, and resampled as a colour is.
 
     Raises
     ------
@@ -75,11 +74,11 @@ def load_texture(
         raise Refused(f"{what} is empty", _REMEDY)
     image, unread = _decoded(data, what)
     for kind in unread:
-        if kind != "alpha" or alpha == "told":
+        if not (kind == "alpha" and alpha):
             found.tell_names(f"{kind} of images", [name])
     size = tuple(min(1 << round(float(np.log2(side))), LARGEST_TEXTURE) for side in image.size)
     curves = dict.fromkeys("RGB", decode(np.arange(256) / 255))
-    if alpha == "read" and "alpha" in unread:
+    if alpha and "alpha" in unread:
         curves["A"] = np.arange(256) / 255
     channels = {c: np.asarray(image.getchannel(c)) for c in curves}
     if image.size == size:

@@ -1,5 +1,6 @@
 """Texel memory: codes of texels, places of levels, and the words that load it."""
 
+from dataclasses import replace
 from itertools import pairwise, product
 
 import numpy as np
@@ -47,8 +48,8 @@ def test_several_textures():
     rng = np.random.default_rng(3)
     sizes = ((1, 1), (64, 64), (2, 2), (8, 16), (1, 32))
     textures = [Texture(rng.random((height, width, 3))) for width, height in sizes]
-    loaded = MEMORY.load([*textures, textures[1]])
-    assert loaded.descriptors[1] == loaded.descriptors[-1]
+    loaded = MEMORY.load([*textures, textures[1], replace(textures[1], alpha=np.ones((64, 64)))])
+    assert loaded.descriptors[1] == loaded.descriptors[-1] == loaded.descriptors[-2]
     assert len(loaded.codes) == 1536
     for texture, descriptor in zip(textures, loaded.descriptors, strict=False):
         height, width, _ = texture.texels.shape

@@ -245,6 +245,19 @@ def test_an_image_is_read_once(tmp_path):
     assert one.texture is other.texture is not None
 
 
+def test_materials_with_alpha_and_without_share_texels(tmp_path):
+    """A tree has bark and leaves in an image."""
+    document, buffer = textured(image=png([[[255, 0, 0, 255], [0, 255, 0, 9]]]))
+    document["materials"].append({**document["materials"][0], "alphaMode": "MASK"})
+    first = document["meshes"][0]["primitives"][0]
+    document["meshes"].append({"primitives": [{**first, "material": 1}]})
+    document["nodes"].append({"mesh": 1, "translation": [5, 0, 0]})
+    document["scenes"][0]["nodes"] = [0, 1]
+    opaque, masked = (of.texture for of in check(load(tmp_path / "a.glb", (document, buffer))).materials)
+    assert (opaque.alpha.size, masked.alpha.size) == (0, 2)
+    assert opaque.texels is masked.texels
+
+
 @pytest.mark.parametrize("mode", ["OPAQUE", "MASK", "BLEND"])
 def test_alpha_of_an_image_is_told_where_it_counts(tmp_path, mode):
     image = png([[[255, 0, 0, 255], [0, 255, 0, 9]]])

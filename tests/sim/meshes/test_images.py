@@ -82,8 +82,10 @@ def test_each_kind_of_png_is_read(data, expected, told):
     assert ignored == told
 
 
-def test_alpha_that_the_material_leaves_out_is_no_news():
-    assert read(png([[51, 255, 128, 254]], 4), alpha="left out")[1] == ()
+def test_alpha_that_is_read_is_no_news():
+    texture, told = read(png([[51, 255, 128, 254]], 4), alpha=True)
+    assert (texture.alpha.tolist(), told) == ([[1, 254 / 255]], ())
+    assert read(png([[51, 255, 128, 255]], 4), alpha=True)[0].alpha.size == 0
 
 
 @pytest.mark.parametrize("kind", ["BMP", "TGA", "WEBP"])
