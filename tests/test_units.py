@@ -48,8 +48,8 @@ Of geometry the quick run has the whole, and not its parts.
 OF_NORMALS = ("pipeline", "renormalise, blinn")
 """It gets the stimuli of unit normals, which the default design does not take."""
 
-SELDOM_STIMULI = ("ties", "terminator")
-"""Stimuli whose expected beats take the longest: integers of any size, and many spans."""
+SELDOM_STIMULI = ("ties", "terminator", "drawn", "dense", "large", "largest")
+"""Stimuli that take the longest: integers of any size, many spans, many or large triangles."""
 
 
 CI = [pytest.mark.long, pytest.mark.ci]
