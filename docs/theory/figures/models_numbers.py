@@ -200,7 +200,7 @@ def _sentences() -> list[str]:
         f"differ by less than {'1e-14' if gram < 1e-14 else gram} for 1,000 random triples",
         f"`{steepest:.3f} sqrt(n)` for `cosquad`, `{slow:.3f} sqrt(n)` for `exp`",
         f"At exponent 100 that is {2550 * steepest * math.radians(0.1):.1f} LSB for a normal that is turned",
-        f"is {near:.2g} when it falls on the pixel nearest to the mean and {far:.2g} when it falls on the",
+        f"The figure is {near:.2g} if this pixel is nearest to the mean, and {far:.2g} if it is farthest",
         f"FLIP p99 <= {perception.FLIP_P99} and max <= {perception.FLIP_MAX:.2f}, and CIEDE2000 p99 <= "
         f"{perception.CIEDE2000_P99} and max <= {perception.CIEDE2000_MAX}",
         f"the largest error is at most {perception.LARGEST_LSB:.0f} LSB",
