@@ -93,7 +93,7 @@ def _runs():
                     )
 
 
-netlist_of = lru_cache(maxsize=2)(cxxrtl._netlist_of)
+netlist_of = lru_cache(maxsize=2)(cxxrtl.netlist_of)
 """Text of a unit. Each is kept beside that of the component that counts its flags."""
 
 
@@ -101,7 +101,7 @@ netlist_of = lru_cache(maxsize=2)(cxxrtl._netlist_of)
 def one_netlist():
     """The engine compiles the text that has the digest: a unit is translated once."""
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(cxxrtl, "_netlist_of", netlist_of)
+        patch.setattr(cxxrtl, "netlist_of", netlist_of)
         yield
 
 

@@ -25,7 +25,7 @@ from blysk.bench.units.record import Record
 from blysk.bench.units.registry import RECORDS
 from blysk.hdl.core.views import copy
 from blysk.hdl.geometry.triangles import COUNTER_BITS
-from blysk.sim.engines import cxxrtl
+from blysk.sim.engines import cxxrtl, cxxrtl_source
 from blysk.sim.engines.compilers import find_compilers
 from blysk.sim.engines.engine import CompilerMissing, Drive, Ports, Trace
 from blysk.sim.engines.simulate import stimulus_of
@@ -351,11 +351,11 @@ class Mutants(cxxrtl.Compiled):
         if counted := flags_of(unit) + _others_of(unit):
             self.ports.status = unsigned(32 * len(counted))
         netlist = (folder / "mutated.il").read_text()
-        self.counters = _COUNTER.findall(cxxrtl._generate(netlist))
+        self.counters = _COUNTER.findall(cxxrtl_source.generated(netlist))
         counters = " ".join(f"BLYSK_COUNTER({name})" for name in self.counters)
         source = f"#define BLYSK_COUNTERS {counters}\n"
         source += resources.files(__package__).joinpath("mutants.cc").read_text(encoding="utf-8")
-        driver = cxxrtl._members(self.ports) + cxxrtl._source("cxxrtl_driver.cc") + source
+        driver = cxxrtl_source.members_of(self.ports) + cxxrtl_source.text_of("cxxrtl_driver.cc") + source
         compiler = next(find_compilers(), None)
         if compiler is None:
             raise CompilerMissing("no C++ compiler")

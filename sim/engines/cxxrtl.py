@@ -8,7 +8,6 @@ beats, at most the first and last 1024 writes, and 512 cycles more than writes.
 
 import contextlib
 import ctypes
-import gc
 import hashlib
 import io
 import os
@@ -22,29 +21,32 @@ import warnings
 import weakref
 from collections.abc import Callable, Iterator
 from dataclasses import replace
-from importlib import metadata, resources
+from importlib import metadata
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-from amaranth._toolchain.yosys import YosysError, YosysWarning
-from amaranth.back import rtlil
 from amaranth.hdl import UnusedElaboratable
 from amaranth.lib.wiring import Component
 
 from blysk.hdl.emit.processes import run_program
-from blysk.hdl.emit.yosys import AmaranthYosys
 from blysk.sim.engines.beats import word_count
 from blysk.sim.engines.cache import cache_folder, code_version, private_folder, warn_of_cache
 from blysk.sim.engines.compilers import Compiler, compiler_missing, find_compilers
+from blysk.sim.engines.cxxrtl_source import (
+    SCRIPT,
+    generated,
+    header_of,
+    members_of,
+    netlist_of,
+    runtime_folder,
+    text_of,
+)
 from blysk.sim.engines.engine import Drive, Ports, SimulationError, StopReason, Trace
-from blysk.sim.engines.guards import group_registers
-from blysk.sim.engines.parts import read_parts
 from blysk.sim.engines.pysim import Interpreted
-from blysk.sim.engines.words import plain_words
 from blysk.sim.errors import InputError
 
-__all__ = ["Compiled", "runtime_folder", "sources_of"]
+__all__ = ["Compiled"]
 
 _REWRITING = ("parts", "guards", "words", "expressions")
 """Modules that rewrite a C++ class. Their text belongs to the key of a compiled model."""
@@ -53,8 +55,6 @@ _REWRITING = ("parts", "guards", "words", "expressions")
 # deleted.
 warnings.filterwarnings("ignore", message=r"<blysk\.", category=UnusedElaboratable)
 
-# No `opt`, nor `opt_clean`: they make wires of registers and combinational fields, which CXXRTL would buffer.
-_SCRIPT = "hierarchy -auto-top; proc; flatten; write_cxxrtl -O6 -g0"
 _BATCH = 1_000_000
 _ROOM = 1 << 24
 _CHECK_BEATS = 64
@@ -94,10 +94,6 @@ def _load(path: Path, key: str) -> ctypes.CDLL:
     return library
 
 
-def _source(name: str) -> str:
-    return resources.files(__package__).joinpath(name).read_text(encoding="utf-8")
-
-
 def _digest(path: Path) -> str:
     return hashlib.sha256(path.read_bytes()).hexdigest()
 
@@ -110,79 +106,6 @@ def _entry(folder: Path, key: str) -> ctypes.CDLL | None:
                 return _load(path, key)
         path.unlink(missing_ok=True)
     return None
-
-
-@contextlib.contextmanager
-def _without_collection() -> Iterator[None]:
-    """Turn garbage collection off.
-
-    A netlist has many small objects, which all stay in use. Garbage collection would take a third of the
-    time.
-    """
-    enabled = gc.isenabled()
-    gc.disable()
-    try:
-        yield
-    finally:
-        if enabled:
-            gc.enable()
-
-
-def _check_netlist(component: Component, netlist: str) -> None:
-    name = type(component).__name__
-    top = re.search(r"^attribute \\top 1$.*?^end$", netlist, re.DOTALL | re.MULTILINE)
-    inputs = (
-        set(re.findall(r"^  wire .* input \d+ +(?:signed )? *\\(\S+)$", top[0], re.MULTILINE))
-        if top
-        else set()
-    )
-    if "clk" not in inputs:
-        raise ValueError(f"{name} has nothing in the clock domain sync")
-    driven = {
-        "i__payload",
-        "i__valid",
-        "o__ready",
-        "constants",
-        "write__payload",
-        "write__valid",
-        "clk",
-        "rst",
-    }
-    if inputs - driven:
-        raise ValueError(f"{name} has inputs that nothing drives: {', '.join(sorted(inputs - driven))}")
-    if re.search(r"^  cell \$(check|print) ", netlist, re.MULTILINE):
-        raise ValueError(f"{name} has an assertion or a print statement, which only the engine pysim runs")
-
-
-def _generate(netlist: str) -> str:
-    """C++ of a netlist."""
-    try:
-        with warnings.catch_warnings(record=True) as caught:
-            warnings.simplefilter("always")
-            text = AmaranthYosys.run(["-q", "-"], f"read_rtlil <<rtlil\n{netlist}\nrtlil\n{_SCRIPT}\n")
-    except YosysError as error:
-        # If the WebAssembly runtime of Yosys fails, the text is a traceback, whose last line has the reason.
-        raise SimulationError(f"Yosys: {str(error).strip().splitlines()[-1]}") from error
-    except PermissionError as error:
-        raise SimulationError(f"Yosys: {error.filename} cannot be started ({error.strerror})") from error
-    for warning in caught:
-        # With feedback or buffered wires, one evaluation a cycle gives wrong values. Several evaluations are
-        # slow.
-        if issubclass(warning.category, YosysWarning) and re.search(
-            "feedback|buffered", str(warning.message)
-        ):
-            raise SimulationError(
-                f"Yosys: {str(warning.message).strip()} A combinational signal depends on itself, "
-                "or one field of a structure on another: give each its own signal, or use the engine pysim"
-            )
-    return plain_words(group_registers(read_parts(text)))
-
-
-def _netlist_of(component: Component) -> str:
-    with _without_collection():
-        netlist = rtlil.convert(component, name="top", emit_src=False)
-    _check_netlist(component, netlist)
-    return netlist
 
 
 class _Origin(pickle.Pickler):
@@ -216,50 +139,12 @@ def _noted(note: Path) -> str:
         return ""
 
 
-def sources_of(component: Component) -> tuple[str, str]:
-    """C++ of a component, and of the driver. The driver includes the file that the macro ``BLYSK_MODEL``
-    names.
-
-    Parameters
-    ----------
-    component : Component
-        As for `Compiled`.
-
-    Raises
-    ------
-    SimulationError, ValueError
-        As `Compiled` raises them for the component.
-    """
-    text = _generate(_netlist_of(component))
-    return text, _header(text) + _members(Ports(component)) + _source("cxxrtl_driver.cc")
-
-
-def runtime_folder() -> Path:
-    """Folder of CXXRTL's headers, which the C++ of `sources_of` may include."""
-    return Path(AmaranthYosys.data_dir()) / "include" / "backends" / "cxxrtl" / "runtime"
-
-
-def _header(text: str) -> str:
-    """The driver's macro ``BLYSK_WORDS`` for a model that does not include CXXRTL's header; else nothing."""
-    return "" if "#include <cxxrtl/cxxrtl.h>" in text else "#define BLYSK_WORDS\n"
-
-
-def _members(ports: Ports) -> str:
-    """The driver's macros ``BLYSK_HAS_...``, one for each optional member that exists and has bits."""
-    shapes = {"CONSTANTS": ports.constants, "WRITE": ports.write, "STATUS": ports.status}
-    return "".join(
-        f"#define BLYSK_HAS_{name}\n"
-        for name, shape in shapes.items()
-        if shape is not None and word_count(shape)
-    )
-
-
 def _key(netlist: str, driver: str, compiler: Compiler) -> str:
     """Key of a compiled model, a hash; ``netlist`` is the netlist's hash, ``driver`` the driver's text."""
     parts = (
         netlist,
-        _SCRIPT,
-        *(_source(f"{name}.py") for name in _REWRITING),
+        SCRIPT,
+        *(text_of(f"{name}.py") for name in _REWRITING),
         driver,
         compiler.identity,
         repr(compiler.compile[1:] + compiler.link[1:]),
@@ -282,9 +167,9 @@ def _workshop() -> Iterator[Path]:
 def _build(netlist: str, driver: str, compiler: Compiler, key: str, folder: Path) -> str | None:
     """Compile the shared library ``model`` in a folder. Returns the compiler's error text, or ``None``."""
     names = f'#define BLYSK_MODEL "model.cc"\n#define BLYSK_KEY "{key}"\n'
-    text = _generate(netlist)
+    text = generated(netlist)
     (folder / "model.cc").write_text(text)
-    (folder / "driver.cc").write_text(names + _header(text) + driver)
+    (folder / "driver.cc").write_text(names + header_of(text) + driver)
     commands = [[*compiler.compile, "-I", str(runtime_folder()), "driver.cc", "-o", "model"]]
     if compiler.link:
         commands[0][-1] = "driver.o"
@@ -361,7 +246,7 @@ class Compiled:
 
     def __init__(self, component: Component, origin: Any = None):
         self.ports = Ports(component)
-        driver = _members(self.ports) + _source("cxxrtl_driver.cc")
+        driver = members_of(self.ports) + text_of("cxxrtl_driver.cc")
         folder = cache_folder()
         self._unchecked: tuple[Component, Path, Path] | None = None
         note = None if origin is None else _note_of(folder, component, origin)
@@ -370,7 +255,7 @@ class Compiled:
             if library is not None:
                 self._library = library
                 return
-        netlist = _netlist_of(component)
+        netlist = netlist_of(component)
         digest = hashlib.sha256(netlist.encode()).hexdigest()
         if note is not None:
             with contextlib.suppress(OSError):

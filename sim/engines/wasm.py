@@ -20,7 +20,7 @@ from blysk.golden.number.fixed import Format
 from blysk.hdl.core.fixed import FixedShape
 from blysk.hdl.emit.processes import run_program
 from blysk.sim.engines.beats import word_count
-from blysk.sim.engines.cxxrtl import runtime_folder, sources_of
+from blysk.sim.engines.cxxrtl_source import runtime_folder, sources_of
 from blysk.sim.engines.engine import CompilerMissing, Ports, SimulationError
 from blysk.sim.installation import install_extra
 

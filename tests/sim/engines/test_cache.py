@@ -10,7 +10,7 @@ import pytest
 
 from blysk.hdl.lighting.diffuse import DiffuseUnit
 from blysk.sim.engines import cache as cache_module
-from blysk.sim.engines import cxxrtl
+from blysk.sim.engines import cxxrtl, cxxrtl_source
 from blysk.sim.engines.simulate import simulate
 
 from .scale import BEATS, Scale, entries, scaled, script, start
@@ -38,7 +38,7 @@ def test_cached_model_needs_neither_yosys_nor_pysim(filled, monkeypatch):
     def never(*arguments):
         raise AssertionError("the model is in the cache")
 
-    monkeypatch.setattr(cxxrtl.AmaranthYosys, "run", never)
+    monkeypatch.setattr(cxxrtl_source.AmaranthYosys, "run", never)
     monkeypatch.setattr(cxxrtl, "Interpreted", never)
     assert scaled() == (3 * BEATS).tolist()
     with pytest.raises(AssertionError, match="the model is in the cache"):
@@ -50,10 +50,10 @@ def test_another_compiler_or_script_is_another_entry(filled, builds, monkeypatch
     if what == "compiler":
         monkeypatch.setenv("CXX", f"{os.environ['CXX']} -DOTHER")
     elif what == "rewriting":
-        source = cxxrtl._source
-        monkeypatch.setattr(cxxrtl, "_source", lambda name: source(name) + "\n")
+        source = cxxrtl.text_of
+        monkeypatch.setattr(cxxrtl, "text_of", lambda name: source(name) + "\n")
     else:
-        monkeypatch.setattr(cxxrtl, "_SCRIPT", cxxrtl._SCRIPT.replace("flatten;", "flatten; opt_expr;"))
+        monkeypatch.setattr(cxxrtl, "SCRIPT", cxxrtl.SCRIPT.replace("flatten;", "flatten; opt_expr;"))
     assert scaled() == (3 * BEATS).tolist()
     assert builds() == 1
     assert len(entries(filled)) == 2
@@ -206,8 +206,8 @@ def diffuse(latency, origin):
 @pytest.fixture
 def netlists(monkeypatch):
     """Components that were made to netlists."""
-    found, netlist_of = [], cxxrtl._netlist_of
-    monkeypatch.setattr(cxxrtl, "_netlist_of", lambda unit: found.append(unit) or netlist_of(unit))
+    found, netlist_of = [], cxxrtl.netlist_of
+    monkeypatch.setattr(cxxrtl, "netlist_of", lambda unit: found.append(unit) or netlist_of(unit))
     return found
 
 
@@ -264,5 +264,5 @@ def test_text_of_every_rewriting_module_is_in_the_key():
         name = waiting.pop()
         if name not in seen:
             seen.append(name)
-            waiting += imported.findall(cxxrtl._source(f"{name}.py"))
+            waiting += imported.findall(cxxrtl.text_of(f"{name}.py"))
     assert sorted(seen) == sorted(cxxrtl._REWRITING)

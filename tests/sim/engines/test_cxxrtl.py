@@ -10,7 +10,7 @@ import pytest
 from amaranth.hdl import Signal
 
 import blysk.sim.engines.simulate
-from blysk.sim.engines import cxxrtl
+from blysk.sim.engines import cxxrtl, cxxrtl_source
 from blysk.sim.engines.engine import SimulationError
 from blysk.sim.engines.simulate import simulate
 
@@ -94,19 +94,19 @@ def test_an_exception_in_progress_ends_the_run(filled):
 def test_garbage_collection_is_as_before(enabled, filled, monkeypatch):
     """Off while a netlist is made, also when that fails; then as the caller has it."""
     seen = []
-    convert = cxxrtl.rtlil.convert
+    convert = cxxrtl_source.rtlil.convert
 
     def watched(*arguments, **options):
         seen.append(gc.isenabled())
         return convert(*arguments, **options)
 
-    monkeypatch.setattr(cxxrtl.rtlil, "convert", watched)
+    monkeypatch.setattr(cxxrtl_source.rtlil, "convert", watched)
     before = gc.isenabled()
     try:
         (gc.enable if enabled else gc.disable)()
         assert scaled() == (3 * BEATS).tolist()
         assert gc.isenabled() == enabled
-        with pytest.raises(ZeroDivisionError), cxxrtl._without_collection():
+        with pytest.raises(ZeroDivisionError), cxxrtl_source._without_collection():
             raise ZeroDivisionError
         assert gc.isenabled() == enabled
     finally:

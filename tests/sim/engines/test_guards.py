@@ -10,7 +10,7 @@ from amaranth.lib import data, stream
 from amaranth.lib.memory import Memory
 from amaranth.lib.wiring import Component, In, Out
 
-from blysk.sim.engines import cxxrtl
+from blysk.sim.engines import cxxrtl_source
 from blysk.sim.engines.guards import _choice, group_registers
 
 from .components import both
@@ -83,8 +83,8 @@ def generated(component, monkeypatch):
     """CXXRTL's own text."""
     with monkeypatch.context() as patch:
         for name in ("read_parts", "group_registers", "plain_words"):
-            patch.setattr(cxxrtl, name, lambda text: text)
-        return cxxrtl._generate(rtlil.convert(component, name="top", emit_src=False))
+            patch.setattr(cxxrtl_source, name, lambda text: text)
+        return cxxrtl_source.generated(rtlil.convert(component, name="top", emit_src=False))
 
 
 @pytest.mark.ci
