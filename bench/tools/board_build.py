@@ -48,6 +48,14 @@ dfflegalize -cell $_DFF_?_ 01 -cell $_DFF_?P?_ r -cell $_SDFF_?P?_ r -cell $_DFF
 """
 """Commands of Yosys's step ``map_ffs`` with the limit `_FEWEST`."""
 
+_MEMORIES = """\
+setattr -set ram_style "distributed" m:*render.pipeline.coordinates
+"""
+"""Commands of Yosys for memories that go into look-up tables.
+
+The coordinates that wait beside shading are 64 words of 25 bits. So the table of sRGB finds room on a 25F.
+"""
+
 _LAYOUT = ("--placer", "static", "--router", "router2", "--router2-alt-weights")
 """Options of nextpnr. This placer makes the shortest wires.
 
@@ -141,6 +149,7 @@ def _script(draw: float) -> str:
     mapped = re.sub(r"(?<=abc9\.D )\d+", str(round(1e6 / draw / 3)), ECP5.synthesis)
     *before, synthesis = mapped.splitlines(keepends=True)
     synthesis += " -nowidelut"
+    before.insert(0, _MEMORIES)
     halves = f"{synthesis} -run begin:map_ffs\n{_LEGALISE}{synthesis} -run map_ffs:"
     return "".join((_LIBRARY, MAP_BEFORE, *before, halves, MAP_AFTER))
 

@@ -10,12 +10,8 @@ COLOURS = {"rgb565": RGB565, "rgb888": RGB888}
 
 _LEFT_OUT = ("size", "projection", "viewer", "target", "operand", "gate", "setup_interval", "style")
 
-DEFAULTS = {"triangles": 1000, "back_faces": "cull", "transfer": "linear"}
-"""Defaults that differ from the defaults of a rendering.
-
-The transfer is linear because the table of sRGB takes two block RAMs. The bitstream for the ULX3S-25F leaves
-only one block RAM free.
-"""
+DEFAULTS = {"triangles": 1000, "back_faces": "cull"}
+"""Defaults that differ from the defaults of a rendering."""
 
 _METHOD = (
     "Method of interpolation along a span.  [default: quotient; renormalise with a model without a table]"

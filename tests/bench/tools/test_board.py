@@ -51,7 +51,7 @@ def pattern_on(board):
         (
             ["ulx3s-25f", "--triangles", "3000", "--simulate", "1", "-o", "x"],
             "--mesh teapot: its 3,080 triangles do not fit the memory of the ulx3s-25f beside the bands; use "
-            "a mesh of at most about 1,706 triangles",
+            "a mesh of at most about 1,024 triangles",
         ),
         (
             ["ulx3s-85f", "--triangles", "3000", "--clock", "5", "--simulate", "1", "-o", "x"],
@@ -255,7 +255,8 @@ def test_the_default_of_a_small_board_has_its_block_rams(monkeypatch):
     monkeypatch.setattr(Memory, "__init__", counted)
     board = BOARDS["ulx3s-25f"]
     Fragment.get(GpuUnit(planned(board, "teapot", {}, None, 52.5)[0]), None)
-    # Shorter memories are of look-up tables.
+    # Shorter memories are of look-up tables. So are the coordinates beside shading, see `board_build`.
+    found.remove((64, 25))
     blocks = [block_rams(depth, width) for depth, width in found if depth >= 64]
     assert len(blocks) > 10
     assert sum(blocks) <= board.block_rams
