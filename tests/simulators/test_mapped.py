@@ -45,6 +45,9 @@ READS = {"name": "lobe", "variant": "blinn", "beats": 1300}
 DESIGNS = [preset(), preset("renormalise", "cosquad")]
 """The default design, and one whose accumulators, roots and setup are others."""
 
+FRAME = (20, 15), 64
+"""Size and triangles: Icarus simulates some ten cycles a second of a mapped pipeline."""
+
 
 @pytest.fixture(scope="module")
 def mapped(tmp_path_factory):
@@ -139,9 +142,9 @@ def test_a_frame_of_a_pipeline(design, tmp_path):
     assert absorbed.removed
     assert same(before, netlist, tmp_path) == ""
     if design is not DESIGNS[0]:
-        # Icarus simulates some ten cycles a second of such a netlist; the proof is of every cycle.
+        # The proof is of every cycle.
         return
-    spans, constants, pixels = teapot_frame(design)
+    spans, constants, pixels = teapot_frame(design, *FRAME)
     found = VerilogBench(unit, tmp_path, core(unit, verilog_of(netlist, tmp_path)), clean=False).run(
         "icarus",
         beats_of(unit, spans),
