@@ -254,7 +254,7 @@ def _sentences() -> list[str]:
         f"the peak by {lost[0]:.1f} LSB at n = 100, and by {lost[1]:.1f} LSB at n = 1000",
         f"at 45° this is {float(half_angle_factor(1 - math.cos(math.radians(45)))) - 0.5:.4f}",
         f"{(q + q * q) / (1 - math.cos(math.radians(45))) - 1:.1%} at most, for k = 0 at 90°",
-        f"a threshold of 2^-10 asks for at most {depths[0]} levels, one of 2^-14 for {depths[1]}",
+        f"a threshold of 2^-10 needs at most {depths[0]} levels, and a threshold of 2^-14 needs {depths[1]}",
         f"A cosine of 16 fraction bits, half a step off, costs {cosine_error:.1%} of psi at 1°",
         f"{roots[1]:.2%}, {roots[2]:.3%} and {roots[3]:.4%} for degree 1, 2 and 3",
         f"relative error of at most {HalfChord.RELATIVE_ERROR:.1e}",
@@ -262,7 +262,7 @@ def _sentences() -> list[str]:
         f"about {bits[0]:.0f} fraction bits for the first difference and {bits[1]:.0f} for the second",
         f"{2.0**-42 * (4094 + 4094**2 / 2):.1e} after 4,095 pixels with the 42 fraction bits",
         f"off by at most {Renormaliser.LENGTH_ERROR:.1e}, 2^{math.log2(Renormaliser.LENGTH_ERROR):.1f}",
-        f"its direction by at most 2^{math.log2(Renormaliser.DIRECTION_ERROR):.1f}",
+        f"the direction of N by at most 2^{math.log2(Renormaliser.DIRECTION_ERROR):.1f}",
         f"at most {turn:.3f} psi^3 up to 60°",
         f"(sqrt 1.1 - 1)/(sqrt 1.1 + 1) = {(math.sqrt(1.1) - 1) / (math.sqrt(1.1) + 1):.4f}",
     ]
