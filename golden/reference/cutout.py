@@ -40,6 +40,7 @@ def dropped_fragments(
     dropped = np.zeros(len(triangle), dtype=bool)
     material = mesh.material[triangle]
     for index, of in scene.cutoffs.items():
+        assert of.cutoff is not None
         chosen = np.flatnonzero(material == index)
         corners, share = mesh.faces[triangle[chosen]], shares[chosen]
         alpha = np.full(len(chosen), of.alpha)

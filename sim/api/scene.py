@@ -184,11 +184,8 @@ def _without_albedo(loaded: LoadedMesh) -> LoadedMesh:
         mesh=replace(mesh, colors=np.zeros((0, 3)), coordinates=np.zeros((0, 2)), alpha=np.zeros(0)),
         ignored=(*loaded.ignored, *told),
     )
-    plain = {"texture": None, "colored": False, "alpha": 1.0, "cutoff": None}
-    return merged(
-        loaded,
-        {number: replace(material, **plain) for number, material in enumerate(materials)},
-    )
+    plain = [replace(material, texture=None, colored=False, alpha=1.0, cutoff=None) for material in materials]
+    return merged(loaded, dict(enumerate(plain)))
 
 
 def scenes_of(loaded: LoadedMesh, settings: Settings, count: int = 1) -> list[Scene]:
