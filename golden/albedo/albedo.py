@@ -156,9 +156,9 @@ class Albedo:
         of_pixel = material[pixels_of(length)[0]]
         codes = np.empty((len(of_pixel), 3), dtype=np.int64)
         for index in np.unique(of_pixel):
-            own = of_pixel == index
-            places = found.coordinates[own], found.level[own]
-            codes[own] = self.texture.sample(texels, textures[index], *places).codes
+            chosen = of_pixel == index
+            places = found.coordinates[chosen], found.level[chosen]
+            codes[chosen] = self.texture.sample(texels, textures[index], *places).codes
         sampled = Fixed(self.FORMAT, codes)
         if found.colors is None:
             return sampled

@@ -315,12 +315,12 @@ class AttributeSpans:
         total = (start << free)[span] + (1 << (free - 1)) + index[:, np.newaxis] * step[span]
         words = Fixed(self.SUM_FORMAT, self.SUM_FORMAT.wrap(total)).truncate(self.WORD_FORMAT.fraction_bits)
         weight = words[:, -1] if self.perspective else None
-        given: list[np.ndarray | None] = [None, None, None]
+        places: list[np.ndarray | None] = [None, None, None]
         if self.coordinates:
             if spans.base is None or spans.range is None or spans.level is None:
                 raise ValueError("spans of texture coordinates must have base, range and level")
-            given = [np.asarray(codes)[span] for codes in (spans.base, spans.range, spans.level)]
-        return AttributeWords(words[:, : self.attributes], weight, *given)
+            places = [np.asarray(codes)[span] for codes in (spans.base, spans.range, spans.level)]
+        return AttributeWords(words[:, : self.attributes], weight, *places)
 
     def errors(self, spans: SpanAttributes, length: np.ndarray) -> np.ndarray:
         """Error bound of every pixel's words: ``(1 + i 2^-e/2) 2^-23``, shape (pixels,)."""

@@ -168,18 +168,18 @@ class Attributes:
         """
         colors = coordinates = None
         numerators = words.numerators
-        given = None
+        inverse = None
         if self.spans.perspective:
             if words.weight is None:
                 raise ValueError("perspective needs 1/W")
             rest, halves, shift = self.reciprocal(words.weight)
-            given = Fixed(rest.format, rest.codes[:, np.newaxis]), halves[:, np.newaxis]
+            inverse = Fixed(rest.format, rest.codes[:, np.newaxis]), halves[:, np.newaxis]
             format = SQ(2, 23)
             numerators = Fixed(format, format.wrap(numerators.codes << shift[:, np.newaxis]))
         if self.spans.colors:
             inside = numerators[:, :3].saturate(UQ(0, 23))
-            if given:
-                inside = self._quotient(inside, inside.truncate(17), *given).wrap(UQ(1, 23))
+            if inverse:
+                inside = self._quotient(inside, inside.truncate(17), *inverse).wrap(UQ(1, 23))
             one = 1 << self.COLOR_FORMAT.fraction_bits
             rounded = inside.round_half_up(self.COLOR_FORMAT.fraction_bits)
             colors = Fixed(self.COLOR_FORMAT, np.minimum(rounded.codes, one))
@@ -187,9 +187,9 @@ class Attributes:
             if words.base is None or words.range is None:
                 raise ValueError("texture coordinates need a base and a range")
             offset = numerators[:, -2:]
-            if given:
+            if inverse:
                 operand = offset.round_half_up(17).saturate(SQ(1, 17))
-                offset = self._quotient(offset, operand, *given).wrap(self.QUOTIENT_FORMAT)
+                offset = self._quotient(offset, operand, *inverse).wrap(self.QUOTIENT_FORMAT)
             spread = offset.codes << words.range[:, np.newaxis]
             dropped = self.QUOTIENT_FORMAT.fraction_bits - self.share_bits
             found = ((spread >> (dropped - 1)) + 1 >> 1) + (words.base << self.share_bits)

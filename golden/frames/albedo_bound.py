@@ -70,9 +70,9 @@ def albedo_bound(
             return None
         material = scene.mesh.material[cut.triangle[cut.span[found.which]]]
         for index in np.unique(material):
-            own = material == index
-            bound[cut.pixel[found.which[own]]] += 255 * parts[index].error(
-                found.albedo[own], found.error[own]
+            chosen = material == index
+            bound[cut.pixel[found.which[chosen]]] += 255 * parts[index].error(
+                found.albedo[chosen], found.error[chosen]
             )
     return bound.reshape(scene.height, scene.width, 3)
 
@@ -127,8 +127,8 @@ def albedo_errors(scene: Scene, albedo: Albedo, cut: Raster) -> Iterator[_Errors
         shown = np.flatnonzero(cut.visible[first : first + int(length.sum())])
         which = first + shown
         first += int(length.sum())
-        own = cast(SpanAttributes, spans[part])
-        words, of_words = albedo.spans.compute(own, length), albedo.spans.errors(own, length)
+        attributes = cast(SpanAttributes, spans[part])
+        words, of_words = albedo.spans.compute(attributes, length), albedo.spans.errors(attributes, length)
         of_color, of_place = (of[shown] for of in albedo.attributes.errors(words, of_words))
         color, texel = fragment_colors(scene, cut, which), np.ones((len(which), 3))
         error = np.zeros((len(which), 3))
@@ -151,12 +151,12 @@ def _sample_errors(samples: Samples, off: np.ndarray) -> np.ndarray:
     texture, nearest = samples.texture, samples.texture.filter == "nearest"
     error = np.empty((len(off), 3))
     for number in np.unique(samples.level):
-        own = np.flatnonzero(samples.level == number)
+        chosen = np.flatnonzero(samples.level == number)
         image = texture.levels[number]
         rounding = np.abs(TexelMemory.linear(TexelMemory.encode(image)) - image)
-        place = samples.coordinates[own] * image.shape[1::-1] - (0 if nearest else 0.5)
-        step = off[own, np.newaxis]
-        found, colors = np.zeros((len(own), 3)), []
+        place = samples.coordinates[chosen] * image.shape[1::-1] - (0 if nearest else 0.5)
+        step = off[chosen, np.newaxis]
+        found, colors = np.zeros((len(chosen), 3)), []
         for signs in product((-1, 1), repeat=2):
             first = np.floor(place + step * signs).astype(np.int64)
             columns, rows = (
@@ -172,5 +172,5 @@ def _sample_errors(samples: Samples, off: np.ndarray) -> np.ndarray:
             down = np.abs(texels[1] - texels[0]).max(axis=0)
             largest = np.max([rounding[row, column] for row in rows for column in columns], axis=0)
             np.maximum(found, largest + step * (across + down), out=found)
-        error[own] = found + (np.ptp(colors, axis=0) if nearest else 0) + TextureFilter.ERROR
+        error[chosen] = found + (np.ptp(colors, axis=0) if nearest else 0) + TextureFilter.ERROR
     return error

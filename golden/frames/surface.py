@@ -182,11 +182,13 @@ def span_attributes(scene: Scene, cut: Raster, albedo: Albedo) -> SpanAttributes
         share = of / total[:, np.newaxis]
         parts = []
         if albedo.colors:
-            given = mesh.colors[corners] if mesh.colors.size else np.ones((len(corners), 3, 3))
-            parts.append(np.clip(np.einsum("sn,snk->sk", share, given), 0, 1))
+            of_corners = mesh.colors[corners] if mesh.colors.size else np.ones((len(corners), 3, 3))
+            parts.append(np.clip(np.einsum("sn,snk->sk", share, of_corners), 0, 1))
         if albedo.texture is not None:
-            given = mesh.coordinates[corners] if mesh.coordinates.size else np.zeros((len(corners), 3, 2))
-            places = np.einsum("sn,snk->sk", share, given) * size
+            of_corners = (
+                mesh.coordinates[corners] if mesh.coordinates.size else np.zeros((len(corners), 3, 2))
+            )
+            places = np.einsum("sn,snk->sk", share, of_corners) * size
             parts.append(np.clip(places, -limits, size + limits))
         ends.append(np.concatenate(parts, axis=1))
     left, right = ends
@@ -208,10 +210,10 @@ def texel_places(scene: Scene, raster: Raster) -> tuple[np.ndarray, np.ndarray, 
     periodic = np.ones((len(material), 2), dtype=bool)
     size = np.zeros((len(material), 2))
     for index, texture in scene.textures.items():
-        own = material == index
+        chosen = material == index
         if texture.mipmapped:
-            level[own] = raster.level[own]
-        periodic[own] = [wrap != "clamp" for wrap in texture.wrap]
+            level[chosen] = raster.level[chosen]
+        periodic[chosen] = [wrap != "clamp" for wrap in texture.wrap]
         sides = np.array([image.shape[1::-1] for image in texture.levels])
-        size[own] = sides[level[own]]
+        size[chosen] = sides[level[chosen]]
     return level, periodic, size

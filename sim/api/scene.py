@@ -152,8 +152,8 @@ def load(
     if loaded.lights:
         settings.use_lights(loaded.lights)
     if loaded.camera is not None and not _sees(loaded.camera, loaded.mesh, settings["size"]):
-        told = "a camera that does not see the mesh"
-        loaded = replace(loaded, camera=None, ignored=(*loaded.ignored, told))
+        reason = "a camera that does not see the mesh"
+        loaded = replace(loaded, camera=None, ignored=(*loaded.ignored, reason))
     return loaded if albedo else _without_albedo(loaded)
 
 
@@ -172,17 +172,17 @@ def _sees(camera: Camera, mesh: Mesh, size: tuple[int, int]) -> bool:
 def _without_albedo(loaded: LoadedMesh) -> LoadedMesh:
     """The mesh without vertex colours, textures and cutoffs of alpha; ``ignored`` names them."""
     materials, mesh = loaded.materials, loaded.mesh
-    told = ["vertex colours"] if len(mesh.colors) else []
+    left_out = ["vertex colours"] if len(mesh.colors) else []
     textures = len({id(material.texture) for material in materials if material.texture is not None})
-    told += [f"{textures} texture{'s' * (textures > 1)}"] if textures else []
+    left_out += [f"{textures} texture{'s' * (textures > 1)}"] if textures else []
     cut = sum(material.cutoff is not None for material in materials)
-    told += [f"{cut} cutoff{'s' * (cut > 1)} of alpha"] if cut else []
+    left_out += [f"{cut} cutoff{'s' * (cut > 1)} of alpha"] if cut else []
     if not any(material.has_albedo or material.cutoff is not None for material in materials):
         return loaded
     loaded = replace(
         loaded,
         mesh=replace(mesh, colors=np.zeros((0, 3)), coordinates=np.zeros((0, 2)), alpha=np.zeros(0)),
-        ignored=(*loaded.ignored, *told),
+        ignored=(*loaded.ignored, *left_out),
     )
     plain = [replace(material, texture=None, colored=False, alpha=1.0, cutoff=None) for material in materials]
     return merged(loaded, dict(enumerate(plain)))

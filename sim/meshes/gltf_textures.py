@@ -106,14 +106,14 @@ def texture_coordinates(info: dict, coordinates: np.ndarray) -> np.ndarray:
 
 def _numbers(transform: dict, key: str, default: list[float]) -> list[float]:
     """One or two finite numbers of a transform."""
-    given = transform.get(key, default if len(default) > 1 else default[0])
-    numbers = given if len(default) > 1 else [given]
+    value = transform.get(key, default if len(default) > 1 else default[0])
+    numbers = value if len(default) > 1 else [value]
     usable = isinstance(numbers, list) and len(numbers) == len(default)
     for number in numbers if usable else []:
         usable &= type(number) in (int, float) and -_LARGEST <= number <= _LARGEST
     if not usable:
         many = "a finite number" if len(default) == 1 else f"{len(default)} finite numbers"
-        raise Refused(f"a texture has the transform's {key} {shown(str(given))!r}, not {many}", ONE_MATERIAL)
+        raise Refused(f"a texture has the transform's {key} {shown(str(value))!r}, not {many}", ONE_MATERIAL)
     return [float(number) for number in numbers]
 
 

@@ -55,8 +55,8 @@ def quantised_spans(
     if model.perspective:
         weights[1] = 2.0 ** rng.uniform(-4, 4, count)
     level = rng.integers(0, 1 << model.LEVEL_FORMAT.width, count)
-    given = tuple(weights) if model.perspective else None
-    return SpanAttributes.quantise(model, left, right, length, given, level), (left, right), weights
+    nearness = tuple(weights) if model.perspective else None
+    return SpanAttributes.quantise(model, left, right, length, nearness, level), (left, right), weights
 
 
 def attribute_word_beats(unit, words: AttributeWords) -> np.ndarray:
