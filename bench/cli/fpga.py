@@ -107,7 +107,7 @@ def command(
         blysk fpga --seeds 3 --json quotient.json
         blysk fpga --family nexus --unit specular
         blysk fpga --pipes 4 --seeds 1
-        blysk fpga --albedo colors,bilinear --transfer srgb
+        blysk fpga --albedo colors --transfer srgb
         blysk fpga --top render --style compact --target 115 --seeds 1
         blysk fpga --top render --style compact --by-unit
     """
