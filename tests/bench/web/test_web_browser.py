@@ -7,8 +7,7 @@ import json
 import numpy as np
 import pytest
 
-from blysk.bench.store import results_of
-from blysk.bench.web import web, web_data, web_designs
+from blysk.bench.web import web, web_data
 from blysk.golden.frame_constants import FrameConstants, writes_of
 from blysk.golden.number.unit_vector import ONE
 from blysk.golden.reference.metrics import error_figures
@@ -19,6 +18,7 @@ from blysk.sim.engines.beats import pack
 from blysk.sim.engines.probes import ObservedPipeline
 
 from .live_page import (
+    DESIGNS,
     by_model,
     change,
     digest,
@@ -80,18 +80,13 @@ def test_a_gate_is_counted(open_page):
 
 
 @pytest.mark.skipif(not has_compiler(), reason="no C++ compiler: pysim would take hours")
-def test_every_module_gives_the_frame_of_the_native_engine(open_page, tmp_path):
-    """All that the command builds by itself, in both engines."""
-    work = web.tasks(web_designs.DESIGNS, {"teapot": 1})
-    web.write_site(tmp_path / "site", work, results_of(work))
-    page = open_page(folder=tmp_path / "site")
-    assert page.evaluate("() => Object.keys(blysk.site.designs)") == [
-        "-".join(pair) for pair in web_designs.DESIGNS
-    ]
+def test_every_module_gives_the_frame_of_the_native_engine(open_page):
+    """Designs of six kinds, in both engines. The units' tests compile the other methods."""
+    page = open_page()
+    assert page.evaluate("() => Object.keys(blysk.site.designs)") == ["-".join(pair) for pair in DESIGNS]
     digests = set()
-    for method, model in web_designs.DESIGNS:
-        page.locator("#method").select_option(method)
-        change(page, "model", model)
+    for method, model in DESIGNS:
+        use(page, method, model)
         state = state_of(page)
         assert (state["method"], state["model"]) == (method, model)
         image, run = natively(state)
@@ -102,7 +97,7 @@ def test_every_module_gives_the_frame_of_the_native_engine(open_page, tmp_path):
             assert figure(page, "gated") == run.status["gated_pixels"], (method, model)
         digests.add(shown)
     # Those that differ by their arithmetic do so in some pixel: none is shown for another.
-    assert len(digests) > len(web_designs.DESIGNS) // 2
+    assert len(digests) > len(DESIGNS) // 2
 
 
 def test_drag_moves_the_light(open_page):
