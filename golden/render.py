@@ -79,7 +79,8 @@ class Renderer:
     Raises
     ------
     ValueError
-        If the method takes values, or other words than the geometry gives. If the design has an albedo.
+        If the method takes values, or other words than the geometry gives. If the design has an albedo, and
+        the method takes no vectors, the albedo has no 1/W, or its texels are outside.
 
     Source: docs/theory/geometry.md#composition; [T] figure 4.10.
     """
@@ -88,14 +89,32 @@ class Renderer:
     geometry: Geometry = _OF_THE_METHOD
 
     def __post_init__(self) -> None:
-        suits = self.design.interpolator.geometry(self.design.lights)
+        suits = self._suits()
         if self.geometry is _OF_THE_METHOD:
             object.__setattr__(self, "geometry", suits)
-        if self.design.albedo is not None:
-            raise ValueError("hardware geometry has no vertex colours and no textures; leave them out")
+        if self.geometry.surface != suits.surface:
+            raise ValueError("the geometry gives other attributes of the surface than the design takes")
         if self.geometry.gives != suits.gives:
             taken, given = suits.gives, self.geometry.gives
             raise ValueError(f"method {self.design.method} takes {taken}, the geometry gives {given}")
+
+    def _suits(self) -> Geometry:
+        """The geometry for the method and the albedo of the design."""
+        found, albedo = self.design.interpolator.geometry(self.design.lights), self.design.albedo
+        if albedo is None:
+            return found
+        if not found.vectors:
+            raise ValueError(
+                f"hardware geometry has no vertex colours and no textures for method {self.design.method}; "
+                "use quotient"
+            )
+        if self.design.build.setups > 1:
+            raise ValueError("vertex colours and textures take one lane of triangle setup; take setups 1")
+        if not albedo.perspective:
+            raise ValueError("hardware geometry gives 1/W of every pixel; take an albedo with perspective")
+        if albedo.texture is not None and albedo.texture.memory.external:
+            raise ValueError("hardware geometry needs its texels inside; take a memory that is not external")
+        return replace(found, surface=albedo.spans)
 
     @property
     def coarse(self) -> CoarseDepth | None:
@@ -145,7 +164,8 @@ class Renderer:
             places = (spans.x, spans.y, spans.length, spans.depth, spans.depth_step)
             hidden = self.coarse.compute(*places)
             dropped = int(spans.length[hidden].sum())
-            spans = replace(spans, **{name: value[~hidden] for name, value in vars(spans).items()})
+            fields = {name: value for name, value in vars(spans).items() if value is not None}
+            spans = replace(spans, **{name: value[~hidden] for name, value in fields.items()})
         spans = self._for_lights(spans, by_material(constants)[0])
         pixels = self.design.compute(shading_spans(spans), constants)
         test = DepthTester()

@@ -9,7 +9,8 @@ from amaranth.lib.wiring import In, Out
 
 from blysk.golden.frame_constants import TEXEL_ADDRESS, TEXELS_ADDRESS
 from blysk.golden.pipeline import ShadingPipeline
-from blysk.hdl.albedo.albedo import AlbedoUnit, span_albedo_shape
+from blysk.hdl.albedo.albedo import AlbedoUnit
+from blysk.hdl.albedo.attribute_spans import span_attributes_shape
 from blysk.hdl.albedo.texel_memory import texels_shape
 from blysk.hdl.albedo.texture_address import texel_request_shape
 from blysk.hdl.core.memory import LATE_FIFO_LATENCY, UNCOUNTED, connect_late_fifo, connect_wide_fifo
@@ -59,7 +60,7 @@ def span_shape(model: ShadingPipeline) -> data.StructLayout:
     if model.materials > 1:
         members["material"] = Shape.cast(range(model.materials))
     if model.albedo is not None:
-        members["attributes"] = span_albedo_shape(model.albedo)
+        members["attributes"] = span_attributes_shape(model.albedo.spans)
     return data.StructLayout(members)
 
 

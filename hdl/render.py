@@ -35,6 +35,10 @@ PORT_DESCRIPTIONS = {
     "i_y": "rows of the three corners",
     "i_depth": "depths of the three corners; a smaller depth is nearer",
     "i_normal": "component (second index) of a corner's (first index) N/W",
+    "i_surface": "attribute (second index) of the surface at a corner (first index), see above",
+    "i_base": "whole texel from which u or v of the triangle counts, -4096 to 4095",
+    "i_range": "a coordinate is base + attribute times 2^range texels of the level, 0 to 11",
+    "i_level": "level of the texture, 0 to 15",
     "i_material": "index of the triangle's material; a larger index counts as the last",
     "i_two_sided": "with back_faces 2: 1 turns the normals of a back face, 0 culls it",
     "o_x": "column of the pixel",
@@ -104,7 +108,7 @@ class RendererUnit(wiring.Component):
 
     Members
     -------
-    i : :py:`In(stream.Signature(triangle_shape(grid)))`
+    i : :py:`In(stream.Signature(triangle_shape(grid, surface)))`
         Triangles.
     o : :py:`Out(stream.Signature(drawn_pixel_shape(x_bits, y_bits)))`
         Pixels to write.
@@ -141,7 +145,7 @@ class RendererUnit(wiring.Component):
         self.coarse = None if coarse is None else CoarseDepthUnit(coarse, *bits)
         self.depth = DepthTesterUnit(*bits, size, clears)
         members = {
-            "i": In(stream.Signature(triangle_shape(geometry.grid))),
+            "i": In(stream.Signature(triangle_shape(geometry.grid, geometry.surface))),
             "o": Out(stream.Signature(drawn_pixel_shape(design.x_bits, design.y_bits))),
             "write": In(stream.Signature(write_shape())),
             "constants": In(_constants_shape(clears or coarse is not None)),

@@ -64,8 +64,8 @@ def known(unit: Component) -> Component:
 def assert_equals_model(unit, run, engine="auto"):
     """Every beat, the status, and of a pipelined unit without stalls every cycle."""
     case, component = run.case, with_status(unit, run)
-    # A compact geometry walks over 4096 scanlines without pixels in 16384 cycles.
-    options = {**case.sent, "idle_timeout": 20_000, **run.stalls}
+    # A compact geometry of ten attributes walks over 4096 scanlines without pixels in 40,960 cycles.
+    options = {**case.sent, "idle_timeout": 50_000, **run.stalls}
     found = simulate(component, case.beats, count=run.count, engine=engine, **options)
     assert_beats_equal(found.beats, run.expected)
     if run.status is not None:

@@ -8,6 +8,9 @@ import numpy as np
 from blysk.bench.units.operands import unit_codes
 from blysk.bench.units.record import Case, Record, Stimulus, Variant
 from blysk.bench.units.triangles import ended, frame_of, random_triangles
+from blysk.golden.albedo.albedo import Albedo
+from blysk.golden.albedo.texel_memory import TexelMemory
+from blysk.golden.albedo.texture_sampler import TextureSampler
 from blysk.golden.frame_constants import FrameConstants, writes_of
 from blysk.golden.frames.prepare import with_tables
 from blysk.golden.geometry.coarse_depth import CoarseDepth
@@ -16,11 +19,13 @@ from blysk.golden.geometry.triangles import FrameSettings, Triangles
 from blysk.golden.presets import preset
 from blysk.golden.render import Renderer
 from blysk.hdl.render import RendererUnit
-from blysk.sim.frames.frame import sample_material
+from blysk.sim.frames.frame import sample_material, sample_textures
+from blysk.sim.frames.triangles import with_surface
 
 __all__ = ["RECORD"]
 
 _SIZE = 32, 24
+_TEXTURE = TextureSampler(TexelMemory(104))
 _SEED = 2026
 
 
@@ -40,7 +45,7 @@ def _constants(rng, renderer):
         frames = np.linalg.qr(rng.normal(size=(design.lights - 1, 3, 3)))[0]
         axes = LightAdapter.codes_of(frames[:, : renderer.rows // len(frames)])
         constants[0] = replace(constants[0], axes=axes)
-    return constants
+    return constants if design.albedo is None else sample_textures(design, constants, rng)
 
 
 def _made(unit, case):
@@ -59,6 +64,7 @@ def _triangles(unit, rng, count, size=6.0, spread=0.2):
     """Overlapping triangles of all kinds in a small picture."""
     design = unit.model.design
     triangles = ended(random_triangles(rng, count, size=size, spread=spread))
+    triangles = with_surface(triangles, unit.model.geometry.surface, rng)
     triangles.material[:] = rng.integers(0, design.materials, count)
     if unit.model.rows:
         # With several lights no normal may be longer than 1.
@@ -94,8 +100,15 @@ def _variants():
             {"model": "phong", "style": "compact", "lights": 3, "materials": 2},
         ),
         ("quotient, 4 lights, no highlights", {"model": None, "lights": 4}),
+        ("quotient, colours", {}),
+        (
+            "quotient, 2 lights, colours, textures, compact",
+            {"lights": 2, "style": "compact", "materials": 2},
+        ),
     ):
         design = preset(**{"x_bits": 5, "y_bits": 5} | options)
+        if "colours" in name:
+            design = replace(design, albedo=Albedo(texture=_TEXTURE if "textures" in name else None))
         coarse = CoarseDepth(*_SIZE) if "coarse" in name else None
         renderer = Renderer(design.built(top="render", coarse=coarse))
         yield name, Variant(partial(RendererUnit, renderer, _SIZE), long=name != "quotient")

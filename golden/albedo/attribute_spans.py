@@ -80,6 +80,23 @@ class SpanAttributes(NamedTuple):
         chosen: list[Any] = [None if field is None else field[which] for field in tuple(self)]
         return SpanAttributes(*chosen)
 
+    @property
+    def beats(self) -> dict[str, Any]:
+        """Members of the beats of the hardware, by name, nested."""
+        lines: dict[str, Any] = {}
+        for member, codes, weight in (
+            ("start", self.start, self.weight_start),
+            ("step", self.step, self.weight_step),
+        ):
+            given = {
+                "colors": codes[:, :3] if codes.shape[1] >= 3 else None,
+                "coordinates": None if self.base is None else codes[:, -2:],
+                "weight": weight,
+            }
+            lines[member] = {name: value for name, value in given.items() if value is not None}
+        others = {name: getattr(self, name) for name in ("exponent", "base", "range", "level")}
+        return lines | {name: value for name, value in others.items() if value is not None}
+
     @classmethod
     def quantise(
         cls,

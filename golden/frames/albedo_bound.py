@@ -2,7 +2,7 @@
 
 from collections.abc import Iterator, Sequence
 from itertools import product
-from typing import NamedTuple, cast
+from typing import NamedTuple, Self, cast
 
 import numpy as np
 
@@ -11,16 +11,20 @@ from blysk.golden.albedo.attribute_spans import SpanAttributes
 from blysk.golden.albedo.texel_memory import TexelMemory
 from blysk.golden.albedo.texture_filter import TextureFilter
 from blysk.golden.frames.border import BORDER
-from blysk.golden.frames.quotient_bound import LightErrors
+from blysk.golden.frames.missed import plane_error
+from blysk.golden.frames.quotient_bound import LightErrors, across_slivers
 from blysk.golden.frames.surface import span_attributes
-from blysk.golden.number.spans import runs_of
+from blysk.golden.geometry.scene_triangles import SceneTriangles
+from blysk.golden.geometry.surface_words import SurfaceWords
+from blysk.golden.number.spans import pixels_of, runs_of
 from blysk.golden.reference.albedo import Samples, fragment_colors, fragment_samples
 from blysk.golden.reference.lighting import Material, distant_cosine
 from blysk.golden.reference.raster import Raster
 from blysk.golden.reference.scene import Scene
 from blysk.golden.reference.texture import wrapped
+from blysk.golden.render import Renderer
 
-__all__ = ["albedo_bound", "albedo_errors"]
+__all__ = ["AttributeErrors", "albedo_bound", "albedo_errors"]
 
 
 class _Errors(NamedTuple):
@@ -31,8 +35,65 @@ class _Errors(NamedTuple):
     error: np.ndarray
 
 
+class AttributeErrors(NamedTuple):
+    """Bounds of the errors of attributes at each pixel of a picture, shape (height * width,).
+
+    Parameters
+    ----------
+    colors, coordinates : float64 arrays
+        Of colours, and of texture coordinates in texels.
+    """
+
+    colors: np.ndarray
+    coordinates: np.ndarray
+
+    @classmethod
+    def of_triangles(cls, renderer: Renderer, sent: SceneTriangles, size: tuple[int, int]) -> Self:
+        """Largest bounds of all triangles that cover a pixel.
+
+        A word is off by the error of its plane, the rounding of the corners, and `SurfaceWords.ERROR`.
+        Slivers have the attributes of their longest edge. So the distance of their middle corner's attributes
+        from this edge counts, too.
+
+        Parameters
+        ----------
+        renderer : Renderer
+            Geometry and shading, with an albedo.
+        sent : SceneTriangles
+            The triangles.
+        size : (int, int)
+            Width and height of the picture.
+        """
+        albedo, (width, height) = renderer.design.albedo, size
+        drawn, pieces, _ = renderer.geometry.pieces(sent.triangles, sent.frame)
+        corners = drawn.triangles.surface
+        assert albedo is not None
+        assert corners is not None
+        assert pieces.surface is not None
+        of_words = plane_error(drawn, renderer) + SurfaceWords.ERROR
+        of_words += across_slivers(drawn, corners, renderer)
+        words = pieces.surface
+        if sent.triangles.base is not None:
+            own = drawn.triangles[pieces.triangle]
+            words = words._replace(base=own.base, range=own.range, level=own.level)
+        span, index = pixels_of(pieces.length)
+        found = albedo.attributes.errors(
+            albedo.spans.compute(words, pieces.length), of_words[pieces.triangle[span]]
+        )
+        pixel = pieces.y[span] * width + pieces.x[span] + index
+        result = cls(np.zeros(width * height), np.zeros(width * height))
+        for of, errors in zip(result, found, strict=True):
+            np.maximum.at(of, pixel, errors)
+        # A colour is 0 to 1.
+        return result._replace(colors=np.minimum(result.colors, 1))
+
+
 def albedo_bound(
-    scene: Scene, albedo: Albedo, cut: Raster, lights: Sequence[LightErrors]
+    scene: Scene,
+    albedo: Albedo,
+    cut: Raster,
+    lights: Sequence[LightErrors],
+    attributes: AttributeErrors | None = None,
 ) -> np.ndarray | None:
     """Bound of the error of every shown pixel, in LSB of linear light.
 
@@ -54,6 +115,8 @@ def albedo_bound(
         The shaded spans.
     lights : sequence of LightErrors
         Bounds of the light on each material.
+    attributes : AttributeErrors, optional
+        Of a frame by triangles. By default those of the spans' own words.
 
     Returns
     -------
@@ -65,7 +128,7 @@ def albedo_bound(
     """
     bound = np.full((scene.height * scene.width, 3), 0.5)
     parts = [_Light.of(scene, *given) for given in zip(scene.materials, lights, strict=True)]
-    for found in albedo_errors(scene, albedo, cut):
+    for found in albedo_errors(scene, albedo, cut, attributes):
         if found is None:
             return None
         material = scene.mesh.material[cut.triangle[cut.span[found.which]]]
@@ -110,7 +173,9 @@ class _Light(NamedTuple):
         return found
 
 
-def albedo_errors(scene: Scene, albedo: Albedo, cut: Raster) -> Iterator[_Errors | None]:
+def albedo_errors(
+    scene: Scene, albedo: Albedo, cut: Raster, attributes: AttributeErrors | None = None
+) -> Iterator[_Errors | None]:
     """Exact albedo of shown fragments, and bounds of its errors, in parts of a frame.
 
     ``None`` for a part where words may miss a texel by more than `BORDER`, in a texture that takes the
@@ -118,18 +183,22 @@ def albedo_errors(scene: Scene, albedo: Albedo, cut: Raster) -> Iterator[_Errors
 
     Parameters
     ----------
-    scene, albedo, cut
+    scene, albedo, cut, attributes
         As for `albedo_bound`.
     """
-    spans, first = span_attributes(scene, cut, albedo), 0
+    spans, first = None if attributes else span_attributes(scene, cut, albedo), 0
     for part in runs_of(cut.length):
         length = cut.length[part]
         shown = np.flatnonzero(cut.visible[first : first + int(length.sum())])
         which = first + shown
         first += int(length.sum())
-        attributes = cast(SpanAttributes, spans[part])
-        words, of_words = albedo.spans.compute(attributes, length), albedo.spans.errors(attributes, length)
-        of_color, of_place = (of[shown] for of in albedo.attributes.errors(words, of_words))
+        if attributes:
+            of_color, of_place = (of[cut.pixel[which]] for of in attributes)
+        else:
+            assert spans is not None
+            own = cast(SpanAttributes, spans[part])
+            words, of_words = albedo.spans.compute(own, length), albedo.spans.errors(own, length)
+            of_color, of_place = (of[shown] for of in albedo.attributes.errors(words, of_words))
         color, texel = fragment_colors(scene, cut, which), np.ones((len(which), 3))
         error = np.zeros((len(which), 3))
         for samples in fragment_samples(scene, cut, which):

@@ -205,7 +205,7 @@ def compare_triangles(
     """Errors of a picture by triangles, with the bound of the method ``quotient``.
 
     The bound holds where the picture shows the triangle that the exact picture shows, see
-    `quotient_triangle_bound`. Other methods, vertex colours and textures have no known bound.
+    `quotient_triangle_bound`. Other methods have no known bound.
 
     Parameters
     ----------
@@ -218,8 +218,12 @@ def compare_triangles(
     image : uint8 array, shape (height, width, 3)
         The frame buffer.
     """
-    bound = triangle_bound(scene, renderer, sent)
-    return _compare(scene, renderer.design, image, rasterise(scene), None, bound)
+    raster = rasterise(scene)
+    if len(raster.level):
+        # The exact picture has the level of each triangle, too.
+        raster = replace(raster, level=sent.levels[raster.triangle].astype(raster.level.dtype))
+    bound = triangle_bound(scene, renderer, sent, raster)
+    return _compare(scene, renderer.design, image, raster, None, bound)
 
 
 def compare_image(scene: Scene, design: ShadingPipeline, image: np.ndarray) -> Comparison:

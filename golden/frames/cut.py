@@ -9,11 +9,12 @@ from blysk.golden.frames.highlight_limits import HighlightLimits
 from blysk.golden.frames.local import chunks, lines_along, weights_along
 from blysk.golden.frames.missed import missed_spans
 from blysk.golden.frames.pieces import Pieces
-from blysk.golden.frames.surface import MOST_TEXELS, texel_places
+from blysk.golden.frames.surface import MOST_TEXELS
 from blysk.golden.methods.frame_steps import SpanCutter
 from blysk.golden.methods.interpolator import Interpolator
 from blysk.golden.pipeline import ShadingPipeline
 from blysk.golden.reference.geometry import normalise
+from blysk.golden.reference.levels import texel_places
 from blysk.golden.reference.raster import Raster
 from blysk.golden.reference.scene import Scene
 
@@ -156,7 +157,7 @@ def cut_by_attributes(scene: Scene, raster: Raster) -> tuple[Raster, int]:
 
 def _by_attributes(scene: Scene, raster: Raster) -> _Criterion:
     """The criterion of `cut_by_attributes`."""
-    size = texel_places(scene, raster)[2]
+    size = texel_places(scene, raster.triangle, raster.level)[2]
 
     def is_wide(origin: np.ndarray, first: np.ndarray, last: np.ndarray) -> np.ndarray:
         steps = np.maximum(raster.length[origin] - 1, 1)

@@ -6,13 +6,14 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import ArrayLike
 
-from blysk.golden.frames.albedo_bound import albedo_bound
+from blysk.golden.frames.albedo_bound import AttributeErrors, albedo_bound
 from blysk.golden.frames.highlight_limits import HighlightLimits
 from blysk.golden.frames.quotient_bound import (
     LightErrors,
     light_errors,
     quotient_bound,
     quotient_triangle_bound,
+    triangle_light_errors,
 )
 from blysk.golden.geometry.scene_triangles import SceneTriangles
 from blysk.golden.lighting.transfer import Transfer
@@ -85,8 +86,12 @@ def pixel_bound(scene: Scene, design: ShadingPipeline, cut: Raster) -> np.ndarra
     return None if design.specular is None else design.interpolator.bound(_PixelBounds(scene, design, cut))
 
 
-def triangle_bound(scene: Scene, renderer: Renderer, sent: SceneTriangles) -> float | None:
+def triangle_bound(
+    scene: Scene, renderer: Renderer, sent: SceneTriangles, raster: Raster
+) -> float | np.ndarray | None:
     """Bound as in `error_bound` of a picture by triangles, see `quotient_triangle_bound`.
+
+    With vertex colours or textures it is a bound of each pixel, as of `pixel_bound`.
 
     Parameters
     ----------
@@ -96,16 +101,19 @@ def triangle_bound(scene: Scene, renderer: Renderer, sent: SceneTriangles) -> fl
         Geometry and shading.
     sent : SceneTriangles
         The scene's triangles.
+    raster : Raster
+        Spans of the exact picture.
 
     Returns
     -------
-    float or None
-        In LSB of linear light. ``None``: no bound is known, as for methods other than ``quotient``, and for
-        vertex colours and textures.
+    float, or float64 array of shape (height, width, 3), or None
+        In LSB of linear light. ``None``: no bound is known, as for methods other than ``quotient``.
     """
     design = renderer.design
-    if design.specular is None or scene.has_albedo:
+    if design.specular is None:
         return None
+    if design.albedo is not None:
+        return design.interpolator.bound(_TrianglePixelBounds(scene, renderer, sent, raster))
     return design.interpolator.bound(_TriangleBounds(scene, renderer, sent))
 
 
@@ -190,6 +198,28 @@ class _TriangleBounds:
         return quotient_triangle_bound(self.scene, self.renderer, self.sent)
 
     def by_tolerance(self) -> float | None:
+        return None
+
+
+@dataclass(frozen=True)
+class _TrianglePixelBounds:
+    """Bounds the error of each pixel of a picture by triangles with albedo, see `ErrorBounds`."""
+
+    scene: Scene
+    renderer: Renderer
+    sent: SceneTriangles
+    raster: Raster
+
+    def by_vectors(self) -> np.ndarray | None:
+        scene, albedo = self.scene, self.renderer.design.albedo
+        errors = triangle_light_errors(scene, self.renderer, self.sent)
+        if errors is None or albedo is None:
+            return None
+        size = scene.width, scene.height
+        attributes = AttributeErrors.of_triangles(self.renderer, self.sent, size)
+        return albedo_bound(scene, albedo, self.raster, errors, attributes)
+
+    def by_tolerance(self) -> None:
         return None
 
 

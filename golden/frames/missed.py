@@ -22,7 +22,7 @@ from blysk.golden.reference.raster import Raster
 from blysk.golden.reference.scene import Scene
 from blysk.golden.render import Renderer
 
-__all__ = ["component_error", "missed_pieces", "missed_spans", "nearest"]
+__all__ = ["component_error", "missed_pieces", "missed_spans", "nearest", "plane_error"]
 
 
 def missed_spans(
@@ -123,11 +123,26 @@ def component_error(drawn: SortedTriangles, pieces: HardwarePieces, renderer: Re
     renderer : Renderer
         Geometry and shading.
     """
+    found: np.ndarray = plane_error(drawn, renderer)[pieces.triangle] + SPAN_NORMAL.step
+    return found
+
+
+def plane_error(drawn: SortedTriangles, renderer: Renderer) -> np.ndarray:
+    """Bound of the error of an attribute at any pixel of each triangle, before it is cut, shape (T,).
+
+    The corners are rounded, and the sums of `GradientSetup` have their error.
+
+    Parameters
+    ----------
+    drawn : SortedTriangles
+        From `Geometry.pieces`.
+    renderer : Renderer
+        Geometry and shading.
+    """
     steps = renderer.geometry.grid.steps
     rows = np.ptp(drawn.triangles.y, axis=1) / steps
     width = np.maximum(drawn.area / np.maximum(rows, 1 / steps) / steps**2, 1 / steps)
-    error = GradientSetup.error(rows, width) + ATTRIBUTE.step / 2 + SPAN_NORMAL.step
-    found: np.ndarray = error[pieces.triangle]
+    found: np.ndarray = GradientSetup.error(rows, width) + ATTRIBUTE.step / 2
     return found
 
 

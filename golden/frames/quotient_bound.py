@@ -21,7 +21,14 @@ from blysk.golden.reference.raster import Raster
 from blysk.golden.reference.scene import Scene
 from blysk.golden.render import Renderer
 
-__all__ = ["LightErrors", "light_errors", "quotient_bound", "quotient_triangle_bound"]
+__all__ = [
+    "LightErrors",
+    "across_slivers",
+    "light_errors",
+    "quotient_bound",
+    "quotient_triangle_bound",
+    "triangle_light_errors",
+]
 
 
 class LightErrors(NamedTuple):
@@ -78,6 +85,23 @@ def light_errors(scene: Scene, design: ShadingPipeline, cut: Raster) -> list[Lig
 def quotient_triangle_bound(scene: Scene, renderer: Renderer, sent: SceneTriangles) -> float | None:
     """Bound of a frame by triangles, in LSB, for pixels where exact shading shows the same triangle.
 
+    Parameters
+    ----------
+    scene, renderer, sent
+        As for `triangle_light_errors`.
+
+    Returns
+    -------
+    float or None
+        The bound; ``None`` as of `triangle_light_errors`.
+    """
+    errors = triangle_light_errors(scene, renderer, sent)
+    return None if errors is None else _bound(scene, errors)
+
+
+def triangle_light_errors(scene: Scene, renderer: Renderer, sent: SceneTriangles) -> list[LightErrors] | None:
+    """Bounds of the light on each material in a frame by triangles, without the rounding of colour operands.
+
     - A component of N/W is off by `component_error`, times the shift.
     - The words of `VectorAdapter` add half a step for the start, the rounding of the step, and an eighth of a
       step for cuts.
@@ -98,12 +122,12 @@ def quotient_triangle_bound(scene: Scene, renderer: Renderer, sent: SceneTriangl
 
     Returns
     -------
-    float or None
-        The bound; ``None`` if the words of a span are too short for a direction.
+    list of LightErrors, or None
+        ``None`` if the words of a span are too short for a direction.
     """
     drawn, pieces, _ = renderer.geometry.pieces(sent.triangles, sent.frame)
-    if not len(pieces):
-        return 0.5
+    if not (renderer.design.lights and len(pieces)):
+        return [LightErrors(*np.zeros((2, 3)))] * len(scene.materials)
     left, right = pieces.left.values, pieces.right.values
     adapter = VectorAdapter(renderer.geometry.rotates)
     steps = np.ldexp(2.0**17 * (1 - 2.0**-adapter.margin_shift), adapter.shift(pieces))
@@ -112,7 +136,8 @@ def quotient_triangle_bound(scene: Scene, renderer: Renderer, sent: SceneTriangl
     # Error of the step and its cuts. If the step is turned, its word is a bit shorter.
     of_step = np.maximum(difference * 2.0**-17, 1 / 16) * (1 + adapter.rotates)
     rounding = np.where(last > 0, of_step + 1 / 8, 0)
-    error = component_error(drawn, pieces, renderer) + _across_slivers(drawn, renderer)[pieces.triangle]
+    across = across_slivers(drawn, drawn.triangles.normal, renderer)
+    error = component_error(drawn, pieces, renderer) + across[pieces.triangle]
     component = 0.5 + rounding + error * steps
     shortest = nearest(left, right) * steps - 2 * component
     if (shortest <= 2 * component).any():
@@ -121,7 +146,7 @@ def quotient_triangle_bound(scene: Scene, renderer: Renderer, sent: SceneTriangl
     mirrored = 2.0**-15 * renderer.mirrors
     errors = replace(errors, turn=errors.turn + mirrored)
     if not renderer.rows:
-        return _bound(scene, _light_errors(scene, renderer.design, errors))
+        return _light_errors(scene, renderer.design, errors)
     longest = np.maximum(*(np.linalg.norm(end, axis=1) for end in (left, right))) * steps
     own = component + 0.5 + np.where(last > 0, of_step, 0) + LightAdapter.AXIS_ERROR * longest / np.sqrt(3)
     if (shortest <= 4 * own).any():
@@ -129,15 +154,25 @@ def quotient_triangle_bound(scene: Scene, renderer: Renderer, sent: SceneTriangl
     further = QuotientErrors.of_words(own, shortest, last, renderer.mirrors, component)
     # The codes of sin a and cos a of the first light change q, too.
     further = replace(further, mismatch=further.mismatch + mirrored)
-    return _bound(scene, _light_errors(scene, renderer.design, errors, further))
+    return _light_errors(scene, renderer.design, errors, further)
 
 
-def _across_slivers(drawn: SortedTriangles, renderer: Renderer) -> np.ndarray:
-    """Largest difference of a component of N/W across each sliver, and 0 for other triangles."""
-    y, normal = drawn.triangles.y, drawn.triangles.normal * ATTRIBUTE.step
+def across_slivers(drawn: SortedTriangles, codes: np.ndarray, renderer: Renderer) -> np.ndarray:
+    """Largest difference of an attribute across each sliver, and 0 for other triangles.
+
+    Parameters
+    ----------
+    drawn : SortedTriangles
+        From `Geometry.pieces`.
+    codes : int64 array, shape (T, 3, n)
+        Codes of attributes at the corners, such as N/W.
+    renderer : Renderer
+        Geometry and shading.
+    """
+    y, value = drawn.triangles.y, codes * ATTRIBUTE.step
     height = y[:, 2] - y[:, 0]
     share = ((y[:, 1] - y[:, 0]) / height)[:, np.newaxis]
-    across = normal[:, 1] - (1 - share) * normal[:, 0] - share * normal[:, 2]
+    across = value[:, 1] - (1 - share) * value[:, 0] - share * value[:, 2]
     sliver = PlaneSetup(renderer.geometry.grid).is_sliver(drawn.area, height)
     return np.where(sliver, np.abs(across).max(axis=1), 0)
 

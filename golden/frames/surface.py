@@ -12,6 +12,7 @@ from blysk.golden.albedo.texture_sampler import TextureSampler
 from blysk.golden.frame_constants import FrameConstants
 from blysk.golden.lighting.intensity import Intensity
 from blysk.golden.pipeline import ShadingPipeline
+from blysk.golden.reference.levels import texel_places
 from blysk.golden.reference.raster import Raster
 from blysk.golden.reference.scene import Scene
 from blysk.golden.reference.texture import Texture
@@ -22,7 +23,6 @@ __all__ = [
     "check_albedo",
     "design_for",
     "span_attributes",
-    "texel_places",
     "with_albedo",
 ]
 
@@ -59,7 +59,9 @@ def albedo_of(scene: Scene) -> Albedo | None:
     )
 
 
-def design_for(design: ShadingPipeline, scene: Scene, scaled: bool = True) -> ShadingPipeline:
+def design_for(
+    design: ShadingPipeline, scene: Scene, scaled: bool = True, triangles: bool = False
+) -> ShadingPipeline:
     """The same design for the materials, vertex colours and textures of a scene.
 
     Parameters
@@ -70,6 +72,8 @@ def design_for(design: ShadingPipeline, scene: Scene, scaled: bool = True) -> Sh
         The scene.
     scaled : bool
         As for `ShadingPipeline.for_materials`.
+    triangles : bool
+        Whether spans come from hardware geometry, which gives 1/W in an orthographic scene, too.
 
     Raises
     ------
@@ -77,6 +81,8 @@ def design_for(design: ShadingPipeline, scene: Scene, scaled: bool = True) -> Sh
         If the textures do not fit the largest texel memory.
     """
     albedo = albedo_of(scene)
+    if albedo is not None and triangles:
+        albedo = replace(albedo, perspective=True)
     if albedo is not None and not design.has_highlights:
         albedo = replace(albedo, tints=False)
     return replace(design.for_materials(scene.materials, scaled), albedo=albedo)
@@ -100,9 +106,10 @@ def check_albedo(scene: Scene, design: ShadingPipeline) -> None:
         if needed and not there:
             raise ValueError(f"the scene has {what}, and the design does not: make it with design_for")
     perspective = scene.camera.projection == "perspective"
-    if albedo is not None and albedo.perspective != perspective:
-        its = "perspective" if albedo.perspective else "orthographic"
-        raise ValueError(f"the albedo of the design is {its}, and the camera is not: make it with design_for")
+    if albedo is not None and perspective and not albedo.perspective:
+        raise ValueError(
+            "the albedo of the design is orthographic, and the camera is not: make it with design_for"
+        )
 
 
 def with_albedo(
@@ -172,7 +179,7 @@ def span_attributes(scene: Scene, cut: Raster, albedo: Albedo) -> SpanAttributes
     """
     mesh = scene.mesh
     corners = mesh.faces[cut.triangle]
-    level, periodic, size = texel_places(scene, cut)
+    level, periodic, size = texel_places(scene, cut.triangle, cut.level)
     # A span that is in the image at one end is not beyond these limits at the other.
     limits = np.where(periodic, np.inf, MOST_TEXELS + 1)
     weights = cut.weights_left, cut.weights_right
@@ -201,19 +208,3 @@ def span_attributes(scene: Scene, cut: Raster, albedo: Albedo) -> SpanAttributes
         level=level,
         periodic=periodic,
     )
-
-
-def texel_places(scene: Scene, raster: Raster) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Level of each span; whether u and v repeat, and the texels of the level, each of shape (spans, 2)."""
-    material = scene.mesh.material[raster.triangle]
-    level = np.zeros(len(material), dtype=np.int64)
-    periodic = np.ones((len(material), 2), dtype=bool)
-    size = np.zeros((len(material), 2))
-    for index, texture in scene.textures.items():
-        chosen = material == index
-        if texture.mipmapped:
-            level[chosen] = raster.level[chosen]
-        periodic[chosen] = [wrap != "clamp" for wrap in texture.wrap]
-        sides = np.array([image.shape[1::-1] for image in texture.levels])
-        size[chosen] = sides[level[chosen]]
-    return level, periodic, size

@@ -77,7 +77,8 @@ def sent_triangles(scene: Scene, renderer: Renderer, angle: float | None = None)
     angle = SPAN_ANGLE if angle is None else angle
     design = renderer.design
     axes = triangle_axes(scene, design)
-    return scene_triangles(scene, renderer.geometry.grid, FrameSettings.limit_of(angle), axes).by_material()
+    geometry, limit = renderer.geometry, FrameSettings.limit_of(angle)
+    return scene_triangles(scene, geometry.grid, limit, axes, geometry.surface).by_material()
 
 
 def triangle_constants(scene: Scene, renderer: Renderer) -> list[FrameConstants]:

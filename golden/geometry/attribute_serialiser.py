@@ -4,14 +4,14 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from blysk.golden.geometry.triangles import ATTRIBUTE, ATTRIBUTES, Triangles
+from blysk.golden.geometry.triangles import ATTRIBUTE, Triangles
 
 __all__ = ["AttributeSerialiser"]
 
 
 @dataclass(frozen=True)
 class AttributeSerialiser:
-    """The components of N/W and the depth of sorted triangles, one after the other, and `least`.
+    """The attributes of sorted triangles, one after the other, and `least`.
 
     ``least`` is a lower bound of the length m of N/W in the triangle: ``m >= max(9/16 M, L, 0)``. Components
     are cut to 11 fraction bits. If a component is negative at the first corner, its bits are inverted at all
@@ -46,7 +46,7 @@ class AttributeSerialiser:
         return found
 
     def compute(self, triangles: Triangles) -> dict[str, np.ndarray]:
-        """Bit-accurate beats, four of each triangle: components x, y and z of N/W, then the depth.
+        """Bit-accurate beats of each triangle: components x, y and z of N/W, the depth, then the surface.
 
         Parameters
         ----------
@@ -55,9 +55,10 @@ class AttributeSerialiser:
 
         Returns
         -------
-        dict of str to int64 array, shape (4 T,)
+        dict of str to int64 array, shape (T (4 + S),)
             ``first``, ``middle`` and ``last``: the attribute at each corner, SQ(1, 23); ``least``: the bound.
         """
-        values = np.moveaxis(triangles.attributes, 1, 0).reshape(3, -1)
+        attributes = triangles.attributes
+        values = np.moveaxis(attributes, 1, 0).reshape(3, -1)
         beats = dict(zip(("first", "middle", "last"), values, strict=True))
-        return beats | {"least": np.repeat(self.least(triangles), ATTRIBUTES)}
+        return beats | {"least": np.repeat(self.least(triangles), attributes.shape[2])}

@@ -1,7 +1,7 @@
 """Edge normals ([T] figure 4.10): unit normals at both ends of every piece of a span."""
 
 from dataclasses import dataclass, field
-from typing import Self
+from typing import Any, Self
 
 import numpy as np
 
@@ -48,7 +48,7 @@ class PlacedSpans:
         return {name: value for name, value in vars(self).items() if name != "triangle"}
 
     @classmethod
-    def of(cls, pieces: Pieces, **others: np.ndarray) -> Self:
+    def of(cls, pieces: Pieces, **others: Any) -> Self:
         """Spans of this class, with places and depths from ``pieces`` and other fields from ``others``."""
         placed = {name: getattr(pieces, name) for name in ("x", "y", "length", "material", "triangle")}
         depths = {name: getattr(pieces, name).codes for name in ("depth", "depth_step")}

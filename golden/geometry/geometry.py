@@ -4,6 +4,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from blysk.golden.albedo.attribute_spans import AttributeSpans
 from blysk.golden.geometry.attribute_serialiser import AttributeSerialiser
 from blysk.golden.geometry.edge_normals import EdgeNormals, TrueSpans
 from blysk.golden.geometry.edge_setup import EdgeSetup
@@ -43,11 +44,14 @@ class Geometry:
     rotates : bool
         Whether vectors will be turned into the frames of further lights, see `VectorAdapter`. Only with
         ``vectors``.
+    surface : AttributeSpans or None
+        Vertex colours and texture coordinates that triangles bring, with 1/W. Only with ``vectors``.
 
     Raises
     ------
     ValueError
-        If both ``lines`` and ``vectors`` are given, or ``rotates`` without ``vectors``.
+        If both ``lines`` and ``vectors`` are given, ``rotates`` or ``surface`` without ``vectors``, or a
+        ``surface`` has no 1/W.
 
     Source: docs/theory/geometry.md#composition; [T] figure 4.10.
     """
@@ -56,12 +60,15 @@ class Geometry:
     lines: bool = False
     vectors: bool = False
     rotates: bool = False
+    surface: AttributeSpans | None = None
 
     def __post_init__(self) -> None:
         if self.lines and self.vectors:
             raise ValueError("spans have true lines or vectors, not both")
         if self.rotates and not self.vectors:
             raise ValueError("only vectors are turned into the frames of lights")
+        if self.surface is not None and not (self.vectors and self.surface.perspective):
+            raise ValueError("vertex colours and textures of triangles need vectors and 1/W")
 
     @property
     def gives(self) -> str:
@@ -131,12 +138,25 @@ class Geometry:
         Raises
         ------
         ValueError
-            If a coordinate is out of the grid's range.
+            If a coordinate is out of the grid's range, or triangles have other attributes than the geometry.
         """
+        self._check(triangles)
         drawn, pieces, counts = self.pieces(triangles, frame)
         spans, repaired = self._shaded(pieces)
         counts = {**counts, "repaired": repaired}
-        return replace(spans, triangle=drawn.source[spans.triangle]), counts
+        spans = replace(spans, triangle=drawn.source[spans.triangle])
+        if isinstance(spans, VectorSpans) and spans.attributes is not None and triangles.base is not None:
+            places = {name: getattr(triangles, name)[spans.triangle] for name in ("base", "range", "level")}
+            spans = replace(spans, attributes=spans.attributes._replace(**places))
+        return spans, counts
+
+    def _check(self, triangles: Triangles) -> None:
+        own = self.surface
+        given = 0 if triangles.surface is None else triangles.surface.shape[2]
+        if given != (0 if own is None else own.attributes + 1):
+            raise ValueError("the triangles have other attributes than the geometry")
+        if (own is not None and own.coordinates) != (triangles.base is not None):
+            raise ValueError("texture coordinates need a base, a range and a level of each triangle")
 
     def _shaded(self, pieces: Pieces) -> tuple[TrueSpans | LineSpans | VectorSpans, int]:
         """The part of pieces that the pipeline reads, and the number of repaired normals."""

@@ -16,8 +16,8 @@ class Planes:
 
     Parameters
     ----------
-    gradients : Gradients, shape (T, 4)
-        Gradients of the components of N/W and of the depth.
+    gradients : Gradients, shape (T, 4 + S)
+        Gradients of the components of N/W, of the depth, and of the surface's attributes.
     piece : int64 array, shape (T,)
         A piece of a span has at most ``2^piece`` pixels; 0 to 12.
     """
@@ -69,7 +69,7 @@ class PlaneAssembler:
 
         Parameters
         ----------
-        gradients : Gradients, shape (T, 4)
+        gradients : Gradients, shape (T, 4 + S)
             From `GradientSetup`.
         least : int64 array, shape (T,)
             From `AttributeSerialiser`, in 2^-11.

@@ -1,14 +1,17 @@
 """From a scene to the triangles that the hardware takes: projection, clipping, rounding, in float64."""
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
+from blysk.golden.albedo.attribute_spans import AttributeSpans, whole_texels
+from blysk.golden.geometry.surface_words import SurfaceWords
 from blysk.golden.geometry.triangles import ATTRIBUTE, DEPTH, GRID, FrameSettings, Grid, Triangles
 from blysk.golden.reference.faces import planes_of, seen_from_behind
+from blysk.golden.reference.levels import texel_places, triangle_levels
 from blysk.golden.reference.scene import Scene
 
-__all__ = ["SceneTriangles", "scene_triangles"]
+__all__ = ["SceneTriangles", "check_texels", "scene_triangles"]
 
 _LARGEST = ATTRIBUTE.max_code
 # The depth to which a picture is cleared, minus 1.
@@ -38,6 +41,11 @@ class SceneTriangles:
         Number of triangles that reach to over 1,000 times the least W of the frame, in a perspective. A depth
         is off by up to 16 steps of 2^-24 of the range of 1/W. At r times the least W this is ``r 2^-20`` of
         W. If r is over 1,000, surfaces 0.1 % apart may change places.
+    several_levels : int
+        Number of triangles with levels of their textures more than 1 apart at their corners. A triangle is
+        drawn with a single level, see `triangle_levels`.
+    levels : int64 array, shape (faces,)
+        Level of each face of the mesh; 0 without textures.
     """
 
     triangles: Triangles
@@ -46,6 +54,8 @@ class SceneTriangles:
     clipped: int
     outside: int
     far: int = 0
+    several_levels: int = 0
+    levels: np.ndarray = field(default_factory=lambda: np.zeros(0, dtype=np.int64))
 
     def by_material(self) -> "SceneTriangles":
         """The same triangles sorted by material. Triangles of a material stay in their order."""
@@ -54,7 +64,11 @@ class SceneTriangles:
 
 
 def scene_triangles(
-    scene: Scene, grid: Grid = GRID, limit: int = FrameSettings.limit, axes: np.ndarray | None = None
+    scene: Scene,
+    grid: Grid = GRID,
+    limit: int = FrameSettings.limit,
+    axes: np.ndarray | None = None,
+    surface: AttributeSpans | None = None,
 ) -> SceneTriangles:
     """Transform a scene's triangles, clip and round them.
 
@@ -74,6 +88,9 @@ def scene_triangles(
         `FrameSettings.limit`.
     axes : float64 array, shape (3, 3), optional
         Unit vectors x, y and z of the frame of the normals, see `vector_axes`. ``None``: the scene's frame.
+    surface : AttributeSpans, optional
+        Attributes of the surface that the triangles bring, see `SurfaceWords`. A mesh without vertex colours
+        is white.
 
     Returns
     -------
@@ -82,7 +99,7 @@ def scene_triangles(
     Raises
     ------
     ValueError
-        If the picture is too large, or the limit out of range.
+        If the picture is too large, the limit out of range, or a triangle crosses too many texels.
     """
     frame = FrameSettings.centred(scene.width, scene.height, back_faces=scene.back_faces, limit=limit)
     mesh = scene.mesh
@@ -92,6 +109,8 @@ def scene_triangles(
     homogeneous[:, 1] += frame.top * homogeneous[:, 2]
     normals = mesh.normals if axes is None else mesh.normals @ axes.T
     records = np.concatenate((homogeneous[mesh.faces], normals[mesh.faces]), axis=-1)
+    if surface is not None:
+        records = np.concatenate((records, _surface_of(scene, surface)), axis=-1)
     source = np.arange(len(records))
     low, high = grid.coordinate.min_code / grid.steps, grid.coordinate.max_code / grid.steps
     # Half a step of the grid is left for the rounding.
@@ -114,7 +133,7 @@ def scene_triangles(
     w = records[..., 2]
     position = np.rint(records[..., :2] / w[..., np.newaxis] * grid.steps).astype(np.int64)
     position = np.clip(position, grid.coordinate.min_code, grid.coordinate.max_code)
-    normal = records[..., 4:] * (w.min(axis=1, keepdims=True) / w)[..., np.newaxis]
+    normal = records[..., 4:7] * (w.min(axis=1, keepdims=True) / w)[..., np.newaxis]
     # Normals of a mesh may be a little longer than 1. Vectors in the frame of a light must not be longer than
     # 1.
     longest = np.linalg.norm(normal, axis=2).max(axis=1)
@@ -131,11 +150,77 @@ def scene_triangles(
         material=mesh.material[source].astype(np.int64),
         two_sided=scene.two_sided[source],
     )
+    several, levels = 0, np.zeros(whole, dtype=np.int64)
+    if surface is not None:
+        places: dict[str, np.ndarray] = {}
+        if surface.coordinates:
+            places, levels, several = _placed(scene, source, records)
+        triangles = replace(triangles, surface=_surface_codes(records[..., 7:], w), **places)
     triangles = _turned(scene, triangles, source)
     far = 0
     if scene.camera.projection == "perspective" and len(w):
         far = int((w.max(axis=1) > _DEEPEST * w.min()).sum())
-    return SceneTriangles(triangles, frame, source, int((cut & present).sum()), int((~present).sum()), far)
+    counts = int((cut & present).sum()), int((~present).sum()), far, several
+    return SceneTriangles(triangles, frame, source, *counts, levels)
+
+
+def check_texels(scene: Scene) -> None:
+    """Refuse texture coordinates that no base and range of a triangle hold.
+
+    Raises
+    ------
+    ValueError
+        If a face crosses more texels than the largest range holds, or a corner is too far outside a clamped
+        image.
+    """
+    faces = scene.mesh.faces
+    _, periodic, size = texel_places(scene, np.arange(len(faces)), np.zeros(len(faces), dtype=np.int64))
+    texels = scene.mesh.coordinates[faces] * size[:, np.newaxis]
+    most, beyond = (2 << AttributeSpans.LARGEST_RANGE) - 2, AttributeSpans.LARGEST_BASE
+    if np.ptp(texels, axis=1).max(initial=0) > most:
+        raise ValueError(f"a triangle crosses more than {most} texels; divide the triangles")
+    if (~periodic & (np.abs(texels).max(axis=1, initial=0) > beyond)).any():
+        raise ValueError(f"a corner is over {beyond} texels from the border of a clamped image; divide it")
+
+
+def _surface_of(scene: Scene, surface: AttributeSpans) -> np.ndarray:
+    """Attributes at the corners of each face, shape (faces, 3, attributes)."""
+    mesh, found = scene.mesh, []
+    if surface.colors:
+        colors = mesh.colors if mesh.colors.size else np.ones((len(mesh.vertices), 3))
+        found.append(np.clip(colors, 0, 1))
+    if surface.coordinates:
+        given = mesh.coordinates if mesh.coordinates.size else np.zeros((len(mesh.vertices), 2))
+        found.append(given)
+    corners: np.ndarray = np.concatenate(found, axis=1)[mesh.faces]
+    return corners
+
+
+def _placed(
+    scene: Scene, source: np.ndarray, records: np.ndarray
+) -> tuple[dict[str, np.ndarray], np.ndarray, int]:
+    """Placement of texture coordinates, which become attributes from -1 to 1; levels of faces.
+
+    The third result is the number of triangles with several levels.
+    """
+    check_texels(scene)
+    coordinates = records[..., -2:]
+    levels, spread = triangle_levels(scene, source, records[..., :3], coordinates)
+    level, periodic, size = texel_places(scene, source, levels[source])
+    texels = coordinates * size[:, np.newaxis]
+    base, found = whole_texels(texels.min(axis=1), texels.max(axis=1))
+    period = AttributeSpans.PERIOD
+    moved = np.where(periodic, (base + period // 2) % period - period // 2, base)
+    records[..., -2:] = (texels - base[:, np.newaxis]) * np.ldexp(1.0, -found)[:, np.newaxis, np.newaxis]
+    return {"base": moved, "range": found, "level": level}, levels, int((spread > 1).sum())
+
+
+def _surface_codes(attributes: np.ndarray, w: np.ndarray) -> np.ndarray:
+    """Codes of ``A s`` and of s at the corners, see `SurfaceWords`; shape (T, 3, attributes + 1)."""
+    scale = (SurfaceWords.LARGEST * w.min(axis=1, keepdims=True) / w)[..., np.newaxis]
+    words = np.concatenate((attributes * scale, scale), axis=-1)
+    codes: np.ndarray = np.rint(words * 2.0**ATTRIBUTE.fraction_bits).astype(np.int64)
+    return codes
 
 
 def _turned(scene: Scene, triangles: Triangles, source: np.ndarray) -> Triangles:
@@ -155,7 +240,7 @@ def _turned(scene: Scene, triangles: Triangles, source: np.ndarray) -> Triangles
     behind = seen_from_behind(scene, plane)[source[chosen]]
     wrong = np.where(behind, (area < 0) & ~scene.culls[source[chosen]], area > 0)
     values = {}
-    for name in ("x", "y", "depth", "normal"):
+    for name in triangles.corners:
         values[name] = getattr(triangles, name).copy()
         values[name][chosen[wrong]] = values[name][chosen[wrong]][:, [0, 2, 1]]
     return replace(triangles, **values)

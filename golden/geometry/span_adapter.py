@@ -110,7 +110,7 @@ def shading_spans(spans: TrueSpans | LineSpans | VectorSpans) -> Spans:
     if isinstance(spans, VectorSpans):
         none = np.zeros_like(spans.start[:, :3])
         placed = spans.x, spans.y, spans.length, none, none, spans.material
-        return Spans(*placed, vectors=spans.vectors)
+        return Spans(*placed, vectors=spans.vectors, attributes=spans.attributes)
     return Spans(
         x=spans.x,
         y=spans.y,

@@ -5,6 +5,7 @@ from typing import Any
 
 import numpy as np
 
+from blysk.golden.albedo.attribute_spans import SpanAttributes as SpanWords
 from blysk.golden.geometry.gradient_setup import GradientSetup
 from blysk.golden.geometry.plane_assembler import Planes
 from blysk.golden.geometry.span_clip import ClippedRows
@@ -49,6 +50,8 @@ class Pieces:
         Step of N/W to the next pixel away from the long edge; without meaning in a span of one pixel.
     turned : bool array, shape (S,), optional
         Whether the span goes to the left from the long edge.
+    surface : SpanAttributes, optional
+        Words of the surface's attributes, of `SurfaceWords`.
     """
 
     x: np.ndarray
@@ -64,6 +67,7 @@ class Pieces:
     triangle: np.ndarray
     step: Fixed | None = None
     turned: np.ndarray | None = None
+    surface: SpanWords | None = None
 
     def __len__(self) -> int:
         return len(self.x)
@@ -79,7 +83,7 @@ class Pieces:
 
         Parameters
         ----------
-        left, right : int64 arrays, shape (S, 4)
+        left, right : int64 arrays, shape (S, 4 or more)
             Codes of the attributes, `SPAN_STEP`. They are cut to the formats, and saturate.
         """
         return {
@@ -98,9 +102,9 @@ class WholeSpans:
     ----------
     x, y, length : int64 arrays, shape (S,)
         As in `Pieces`.
-    near, far : Fixed, shape (S, 4), SQ(2, 32)
+    near, far : Fixed, shape (S, 4 or more), SQ(2, 32)
         Attributes at the first and the last pixel's centre, modulo 4. The first pixel is at the long edge.
-    inward : Fixed, shape (S, 4), SQ(2, 32)
+    inward : Fixed, shape (S, 4 or more), SQ(2, 32)
         Step of the attributes from the first to the next pixel.
     right : bool array, shape (S,)
         Whether the long edge is on the right.

@@ -4,6 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from blysk.golden.albedo.attribute_spans import SpanAttributes
 from blysk.golden.geometry.span_attributes import (
     DEPTH_STEP,
     SPAN_NORMAL,
@@ -11,6 +12,8 @@ from blysk.golden.geometry.span_attributes import (
     Pieces,
     WholeSpans,
 )
+from blysk.golden.geometry.surface_words import SurfaceWords
+from blysk.golden.geometry.triangles import ATTRIBUTES
 from blysk.golden.number.fixed import Fixed
 
 __all__ = ["SpanHalver"]
@@ -113,8 +116,16 @@ class SpanHalver:
             triangle=spans.triangle[span],
             step=Fixed(SPAN_STEP, step[:, :3]),
             turned=right,
+            surface=self._surface(np.where(turned, far, near), np.where(turned, -step, step)),
         )
         return pieces, int((np.bincount(span, minlength=1) > 1).sum())
+
+    @staticmethod
+    def _surface(start: np.ndarray, step: np.ndarray) -> SpanAttributes | None:
+        """Words of the attributes behind the depth, from codes at the first pixel and of the step."""
+        if start.shape[1] == ATTRIBUTES:
+            return None
+        return SurfaceWords().compute(start[:, ATTRIBUTES:], step[:, ATTRIBUTES:])
 
     @staticmethod
     def ends(near: np.ndarray, far: np.ndarray) -> tuple[Fixed, Fixed]:

@@ -182,6 +182,12 @@ class Triangles:
     two_sided : bool array, shape (T,)
         Whether a frame that culls back faces draws the triangle's back with negated normals, in place of
         culling it.
+    surface : int64 array, shape (T, 3, S), optional
+        Vertex colours and texture coordinates over W, then 1/W, `ATTRIBUTE`, see `SurfaceWords`.
+    base : int64 array, shape (T, 2), optional
+        Whole texel from which the texture coordinates of a triangle count, see `SpanAttributes`.
+    range, level : int64 arrays, shape (T,), optional
+        Range of these coordinates, and level of the texture.
     """
 
     x: np.ndarray
@@ -190,6 +196,10 @@ class Triangles:
     normal: np.ndarray
     material: np.ndarray
     two_sided: np.ndarray
+    surface: np.ndarray | None = None
+    base: np.ndarray | None = None
+    range: np.ndarray | None = None
+    level: np.ndarray | None = None
 
     def __len__(self) -> int:
         return len(self.x)
@@ -200,12 +210,17 @@ class Triangles:
 
     @property
     def attributes(self) -> np.ndarray:
-        """Codes of the attributes, int64 array of shape (T, 3, 4): N/W, then ``depth - 2^23``."""
+        """Codes of N/W, of ``depth - 2^23``, and of the surface: int64 array, shape (T, 3, 4 + S)."""
         depth = self.depth + ATTRIBUTE.min_code
-        return np.concatenate((self.normal, depth[..., np.newaxis]), axis=-1)
+        surface = () if self.surface is None else (self.surface,)
+        return np.concatenate((self.normal, depth[..., np.newaxis], *surface), axis=-1)
+
+    @property
+    def corners(self) -> tuple[str, ...]:
+        """Fields with a value for each corner."""
+        return ("x", "y", "depth", "normal", *([] if self.surface is None else ["surface"]))
 
     @property
     def beats(self) -> dict[str, np.ndarray]:
         """Fields of the input beats of the hardware, by name: arrays of codes."""
-        names = ("x", "y", "depth", "normal", "material", "two_sided")
-        return {name: getattr(self, name) for name in names}
+        return {name: value for name, value in vars(self).items() if value is not None}

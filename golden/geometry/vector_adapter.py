@@ -1,9 +1,11 @@
 """The vector adapter: N/W at the first pixel of a span and its step, for methods that take vectors."""
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
+from blysk.golden.albedo.attribute_spans import SpanAttributes
 from blysk.golden.cosines.quotient_spans import QuotientSpans, SpanVectors
 from blysk.golden.geometry.edge_normals import PlacedSpans
 from blysk.golden.geometry.span_attributes import SPAN_NORMAL, SPAN_STEP, Pieces
@@ -24,11 +26,21 @@ class VectorSpans(PlacedSpans):
         As in `SpanVectors`. The step of a span of one pixel has no meaning.
     exponent : int64 array, shape (S,)
         As in `SpanVectors`.
+    attributes : SpanAttributes, optional
+        Vertex colours and texture coordinates, for a design with an albedo.
     """
 
     start: np.ndarray
     step: np.ndarray
     exponent: np.ndarray
+    attributes: SpanAttributes | None = None
+
+    @property
+    def beats(self) -> dict[str, Any]:
+        """Fields of the output beats of the hardware, by name: arrays of codes."""
+        beats: dict[str, Any] = super().beats
+        del beats["attributes"]
+        return beats if self.attributes is None else beats | {"attributes": self.attributes.beats}
 
     @property
     def vectors(self) -> SpanVectors:
@@ -121,7 +133,7 @@ class VectorAdapter:
         word = self._rounded(
             self._smaller(shifted) << exponent[:, np.newaxis], flip != turned, self.STEP_BITS
         )
-        return VectorSpans.of(pieces, start=start, step=word, exponent=exponent)
+        return VectorSpans.of(pieces, start=start, step=word, exponent=exponent, attributes=pieces.surface)
 
     @property
     def margin_shift(self) -> int:

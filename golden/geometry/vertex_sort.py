@@ -110,9 +110,7 @@ class VertexSort:
         kept = triangles[source]
         order = self.order(kept)
         rows = np.arange(len(kept))[:, np.newaxis]
-        kept = replace(
-            kept, **{name: getattr(kept, name)[rows, order] for name in ("x", "y", "depth", "normal")}
-        )
+        kept = replace(kept, **{name: getattr(kept, name)[rows, order] for name in kept.corners})
         dx, dy = (values[:, 1:] - values[:, :1] for values in (kept.x, kept.y))
         area = dx[:, 0] * dy[:, 1] - dx[:, 1] * dy[:, 0]
         # An odd order of three corners exchanges two corners and leaves one corner in its place.

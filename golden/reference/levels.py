@@ -7,7 +7,7 @@ import numpy as np
 from blysk.golden.reference.geometry import sum_of_components
 from blysk.golden.reference.scene import Scene
 
-__all__ = ["span_levels"]
+__all__ = ["span_levels", "texel_places", "triangle_levels"]
 
 
 def span_levels(
@@ -39,9 +39,85 @@ def span_levels(
     Source: docs/theory/textures.md#levels.
     """
     corners = scene.mesh.coordinates[scene.mesh.faces[triangle]]
+    return _levels(scene, triangle, _steps(corners, ends, slopes))
+
+
+def triangle_levels(
+    scene: Scene, source: np.ndarray, corners: np.ndarray, coordinates: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """Level of each face, for hardware that takes the level of a texture with a triangle.
+
+    It is the level of the largest texel step at the mean of the corners in space, see `span_levels`. A face
+    in several pieces has the level of the mean of their steps.
+
+    Parameters
+    ----------
+    scene : Scene
+        Mesh with texture coordinates, and materials.
+    source : int array, shape (T,)
+        Face of each triangle, or of each piece of a clipped triangle.
+    corners : float64 array, shape (T, 3, 3)
+        Homogeneous coordinates of the corners: x and y times w in pixels, and w, over 0.
+    coordinates : float64 array, shape (T, 3, 2)
+        Texture coordinates of the corners.
+
+    Returns
+    -------
+    level : int64 array, shape (faces,)
+        0 for a face without a texture, or without area.
+    spread : int64 array, shape (T,)
+        Largest difference of the levels at the corners of each triangle.
+
+    Source: docs/theory/textures.md#levels.
+    """
+    normals = np.cross(np.roll(corners, -1, axis=1), np.roll(corners, -2, axis=1))
+    volume = np.einsum("tk,tk->t", corners[:, 0], normals[:, 0])[:, np.newaxis]
+    slopes = [np.where(volume, normals[..., axis] / np.where(volume, volume, 1), 0) for axis in (0, 1)]
+
+    def steps(share: np.ndarray) -> np.ndarray:
+        w = corners[..., 2] @ share
+        return _steps(coordinates, [share / w[:, np.newaxis]], slopes)
+
+    middle, faces = steps(np.full(3, 1 / 3)), len(scene.mesh.faces)
+    pieces = np.maximum(np.bincount(source, minlength=faces), 1)
+    mean = np.stack([np.bincount(source, of, faces) / pieces for of in middle.T], axis=1)
+    of_corners = np.array([_levels(scene, source, steps(share)) for share in np.eye(3)])
+    return _levels(scene, np.arange(faces), mean), np.ptp(of_corners, axis=0)
+
+
+def texel_places(
+    scene: Scene, triangle: np.ndarray, levels: np.ndarray
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Level of each span; whether u and v repeat, and texels of the level, each of shape (spans, 2).
+
+    Parameters
+    ----------
+    scene : Scene
+        Mesh and materials.
+    triangle : int array, shape (spans,)
+        Face of each span.
+    levels : int array, shape (spans,)
+        Level of each span; only read if a texture has several levels.
+    """
+    material = scene.mesh.material[triangle]
+    level = np.zeros(len(material), dtype=np.int64)
+    periodic = np.ones((len(material), 2), dtype=bool)
+    size = np.zeros((len(material), 2))
+    for index, texture in scene.textures.items():
+        chosen = material == index
+        if texture.mipmapped:
+            level[chosen] = levels[chosen]
+        periodic[chosen] = [wrap != "clamp" for wrap in texture.wrap]
+        sides = np.array([image.shape[1::-1] for image in texture.levels])
+        size[chosen] = sides[level[chosen]]
+    return level, periodic, size
+
+
+def _steps(corners: np.ndarray, ends: Sequence[np.ndarray], slopes: Sequence[np.ndarray]) -> np.ndarray:
+    """Largest derivatives of u and v over places and directions, shape (spans, 2)."""
     # A whole number of tiles away, coordinates have the same derivative with a larger rounding.
     corners = corners - corners[:, :1]
-    step = np.zeros((len(triangle), 2))
+    step = np.zeros((len(corners), 2))
     for weights in ends:
         w = sum_of_components(weights)[:, np.newaxis]
         place = np.einsum("sn,snk->sk", weights, corners) / w
@@ -49,6 +125,11 @@ def span_levels(
             change = np.einsum("sn,snk->sk", slope, corners)
             change -= place * sum_of_components(slope)[:, np.newaxis]
             np.maximum(step, np.abs(change / w), out=step)
+    return step
+
+
+def _levels(scene: Scene, triangle: np.ndarray, step: np.ndarray) -> np.ndarray:
+    """Level of each step, by the texture of its face."""
     level = np.zeros(len(triangle), dtype=np.int64)
     material = scene.mesh.material[triangle]
     for index, texture in scene.textures.items():

@@ -165,6 +165,8 @@ class Drawing:
         size = scene.width, scene.height
         x_bits, y_bits = cls.place_bits(size, lines)
         design = replace(design, x_bits=x_bits, y_bits=y_bits)
+        if design.albedo is not None:
+            raise ValueError("a mesh in memory has no vertex colours and no textures; leave out the albedo")
         renderer, mesh = Renderer(design), MeshMemory.of([scene.mesh])
         given = [triangle_axes(each, design) for each in scenes]
         turned_to = [np.eye(3) if axes is None else axes for axes in given]

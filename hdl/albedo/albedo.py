@@ -18,23 +18,10 @@ from blysk.hdl.core.pipelined_unit import PipelinedUnit
 from blysk.hdl.core.stream import connect
 from blysk.hdl.core.views import copy, copy_fields
 
-__all__ = ["AlbedoUnit", "span_albedo_shape"]
+__all__ = ["AlbedoUnit"]
 
 _WAITING = 32
 """Room for vertex colours that wait for their texels. A sample in a memory inside takes fewer cycles."""
-
-
-def span_albedo_shape(model: Albedo) -> data.StructLayout:
-    """Shape of the attributes of a span, without its length.
-
-    Parameters
-    ----------
-    model : Albedo
-        The albedo path.
-    """
-    members = dict(attribute_span_shape(model.spans).members)
-    del members["length"]
-    return data.StructLayout(members)
 
 
 class _ColorProductUnit(PipelinedUnit):

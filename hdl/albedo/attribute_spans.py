@@ -13,7 +13,13 @@ from blysk.hdl.core.fixed import FixedShape
 from blysk.hdl.core.stream import count_down, skid_buffer
 from blysk.hdl.core.views import copy_fields
 
-__all__ = ["AttributeSpansUnit", "attribute_span_shape", "attribute_words_shape"]
+__all__ = [
+    "AttributeSpansUnit",
+    "attribute_span_shape",
+    "attribute_words_shape",
+    "placement_shape",
+    "span_attributes_shape",
+]
 
 
 def _lines(model: AttributeSpans) -> dict:
@@ -28,8 +34,8 @@ def _lines(model: AttributeSpans) -> dict:
     return members
 
 
-def _of_span(model: AttributeSpans) -> dict:
-    """Members that all pixels of a span share."""
+def placement_shape(model: AttributeSpans) -> dict:
+    """Members that place the texture coordinates of a span: base, range, level; none without coordinates."""
     if not model.coordinates:
         return {}
     return {
@@ -39,8 +45,8 @@ def _of_span(model: AttributeSpans) -> dict:
     }
 
 
-def attribute_span_shape(model: AttributeSpans, length_bits: int = LENGTH_BITS) -> data.StructLayout:
-    """Shape of a span: words at the first pixel, their steps, the exponent of all steps, and the length.
+def span_attributes_shape(model: AttributeSpans) -> data.StructLayout:
+    """Shape of the attributes of a span: words at the first pixel, their steps, the exponent of all steps.
 
     ``start`` and ``step`` have the members ``colors`` (3 words), ``coordinates`` (2 words) and ``weight``, as
     far as the model has them. With texture coordinates there are also ``base``, ``range`` and ``level``.
@@ -49,13 +55,23 @@ def attribute_span_shape(model: AttributeSpans, length_bits: int = LENGTH_BITS) 
     ----------
     model : AttributeSpans
         The attributes.
-    length_bits : int
-        Bits of the length.
     """
     lines = data.StructLayout(_lines(model))
     exponent = unsigned(model.EXPONENT_FORMAT.width)
-    members = {"start": lines, "step": lines, "exponent": exponent}
-    return data.StructLayout(members | _of_span(model) | {"length": unsigned(length_bits)})
+    return data.StructLayout({"start": lines, "step": lines, "exponent": exponent} | placement_shape(model))
+
+
+def attribute_span_shape(model: AttributeSpans, length_bits: int = LENGTH_BITS) -> data.StructLayout:
+    """Shape of a span: its attributes as of `span_attributes_shape`, and its length.
+
+    Parameters
+    ----------
+    model : AttributeSpans
+        The attributes.
+    length_bits : int
+        Bits of the length.
+    """
+    return data.StructLayout(span_attributes_shape(model).members | {"length": unsigned(length_bits)})
 
 
 def attribute_words_shape(model: AttributeSpans) -> data.StructLayout:
@@ -68,7 +84,7 @@ def attribute_words_shape(model: AttributeSpans) -> data.StructLayout:
     model : AttributeSpans
         The attributes.
     """
-    return data.StructLayout(_lines(model) | _of_span(model))
+    return data.StructLayout(_lines(model) | placement_shape(model))
 
 
 class AttributeSpansUnit(wiring.Component):
@@ -136,7 +152,7 @@ class AttributeSpansUnit(wiring.Component):
                 with m.Else():
                     m.d.sync += total.eq(total + difference)
             m.d.comb += word.eq(total[free:])
-        shared = _of_span(p)
+        shared = placement_shape(p)
         if shared:
             held = Signal(data.StructLayout(shared), name="of_span", reset_less=True)
             with m.If(advance & ends):

@@ -4,25 +4,28 @@ from amaranth.hdl import Cat, Module, Mux, Signal, Value, signed, unsigned
 from amaranth.lib import data, stream, wiring
 from amaranth.lib.wiring import In, Out
 
+from blysk.golden.albedo.attribute_spans import AttributeSpans
 from blysk.golden.geometry.attribute_serialiser import AttributeSerialiser
 from blysk.golden.geometry.triangles import ATTRIBUTE, ATTRIBUTES, DEPTH
 from blysk.hdl.core.fixed import FixedShape
 from blysk.hdl.core.stream import skid_buffer
 from blysk.hdl.core.views import copy
+from blysk.hdl.geometry.surface_words import attribute_count, corner_surface_shape
 
 __all__ = ["AttributeSerialiserUnit", "corner_attributes_shape", "serial_attribute_shape"]
 
-_GIVES = 8
-"""Step at which the first attribute goes to the output. The bound is known from this step on."""
+_KNOWN = 8
+"""Step from which on the bound is known."""
 
 
-def corner_attributes_shape() -> data.StructLayout:
+def corner_attributes_shape(surface: AttributeSpans | None = None) -> data.StructLayout:
     """Shape of the attributes of three sorted corners."""
     component = FixedShape(ATTRIBUTE)
     return data.StructLayout(
         {
             "depth": data.ArrayLayout(FixedShape(DEPTH), 3),
             "normal": data.ArrayLayout(data.ArrayLayout(component, 3), 3),
+            **corner_surface_shape(surface),
         }
     )
 
@@ -34,34 +37,37 @@ def serial_attribute_shape() -> data.StructLayout:
 
 
 class AttributeSerialiserUnit(wiring.Component):
-    """The four attributes of each triangle, one after the other. `AttributeSerialiser` is the model.
+    """The n attributes of each triangle, one after the other. `AttributeSerialiser` is the model.
 
-    The first attribute is offered 9 cycles after the triangle is taken in. The other attributes follow on the
-    next three cycles, unless the output waits. The next triangle is taken in on the cycle of the last
-    attribute. So the initiation interval is 12 cycles. Without a skid buffer attributes come every second
-    cycle, and the interval is 15. The unit has no multipliers.
+    n is 4, or more with a surface. The first attribute is offered n + 5 cycles after the triangle is taken
+    in. The other attributes follow on the next cycles, unless the output waits. The next triangle is taken in
+    on the cycle of the last attribute. So the initiation interval is 2 n + 4 cycles, 12 with four attributes.
+    Without a skid buffer attributes come every second cycle, and the interval is 3 n + 3. The unit has no
+    multipliers.
 
     Parameters
     ----------
     skid : bool
         Whether the output has a skid buffer. If not, the output has a register, which keeps its payload until
         the sink takes it.
+    surface : AttributeSpans or None
+        Attributes of the surface that triangles bring.
 
     Members
     -------
-    i : :py:`In(stream.Signature(corner_attributes_shape()))`
+    i : :py:`In(stream.Signature(corner_attributes_shape(surface)))`
         Attributes of triangles with sorted corners.
     o : :py:`Out(stream.Signature(serial_attribute_shape()))`
-        Components x, y, z of N/W, then the depth.
+        Components x, y, z of N/W, the depth, then the surface.
 
     Source: docs/theory/geometry.md#normals; not in the documents.
     """
 
-    def __init__(self, skid: bool = True):
-        self._skid = skid
+    def __init__(self, skid: bool = True, surface: AttributeSpans | None = None):
+        self._skid, self._surface = skid, surface
         super().__init__(
             {
-                "i": In(stream.Signature(corner_attributes_shape())),
+                "i": In(stream.Signature(corner_attributes_shape(surface))),
                 "o": Out(stream.Signature(serial_attribute_shape())),
             }
         )
@@ -69,11 +75,12 @@ class AttributeSerialiserUnit(wiring.Component):
     def elaborate(self, platform):
         """The corners' words in rings, which turn once for the bound and once more for the output."""
         m = Module()
+        count = attribute_count(self._surface)
         corners = [
-            [Signal(FixedShape(ATTRIBUTE), name=f"corner_{k}_{a}") for a in range(ATTRIBUTES)]
-            for k in range(3)
+            [Signal(FixedShape(ATTRIBUTE), name=f"corner_{k}_{a}") for a in range(count)] for k in range(3)
         ]
-        step, advance = Signal(4, name="step"), Signal(name="advance")
+        first = max(_KNOWN, count + ATTRIBUTES)
+        step, advance = Signal(range(first + count), name="step"), Signal(name="advance")
         valid, result = Signal(name="valid"), Signal(self.o.payload.shape(), name="result")
         least = self._least(m, step, [words[0] for words in corners])
         if self._skid:
@@ -82,8 +89,8 @@ class AttributeSerialiserUnit(wiring.Component):
             m.d.comb += [advance.eq(~valid), self.o.valid.eq(valid), copy(self.o.payload, result)]
             with m.If(self.o.ready):
                 m.d.sync += valid.eq(0)
-        rounds, gives = (step != 0) & (step <= ATTRIBUTES), step >= _GIVES
-        free, ends = Signal(name="free", init=1), step == _GIVES + ATTRIBUTES - 1
+        rounds, gives = (step != 0) & (step <= count), step >= first
+        free, ends = Signal(name="free", init=1), step == first + count - 1
         m.d.comb += self.i.ready.eq(free)
         with m.If(free):
             m.d.sync += [step.eq(self.i.valid), free.eq(~self.i.valid)]
@@ -92,6 +99,8 @@ class AttributeSerialiserUnit(wiring.Component):
                 # The depth minus half its range, made by inverting its first bit.
                 depth = Value.cast(self.i.payload.depth[k])
                 values.append(Cat(depth[:-1], ~depth[-1]))
+                if self._surface is not None:
+                    values += [Value.cast(value) for value in self.i.payload.surface[k]]
                 m.d.sync += [Value.cast(word).eq(value) for word, value in zip(words, values, strict=True)]
         with m.Else():
             with m.If(advance | ~gives):
@@ -109,7 +118,7 @@ class AttributeSerialiserUnit(wiring.Component):
         return m
 
     def _least(self, m: Module, step: Signal, words: list) -> Signal:
-        """The bound, from one component of each corner a cycle. It is known from step `_GIVES` on."""
+        """The bound, from one component of each corner a cycle. It is known from step `_KNOWN` on."""
         bits = AttributeSerialiser.FRACTION_BITS + 1
         sign = Value.cast(words[0])[-1]
         turned = [(Value.cast(word)[-bits:] ^ sign.replicate(bits)).as_signed() for word in words]

@@ -1,14 +1,14 @@
 """Geometry ([T] figure 4.10): triangles to spans."""
 
 from amaranth.hdl import Array, Module, Signal, Value, unsigned
-from amaranth.lib import stream, wiring
+from amaranth.lib import data, stream, wiring
 from amaranth.lib.wiring import In, Out
 
 from blysk.golden.build import Build
 from blysk.golden.geometry.geometry import COUNTERS, Geometry
 from blysk.golden.geometry.plane_assembler import PlaneAssembler
 from blysk.golden.geometry.span_halver import SpanHalver
-from blysk.golden.geometry.triangles import ATTRIBUTES, Grid
+from blysk.golden.geometry.triangles import ATTRIBUTES
 from blysk.golden.geometry.vector_adapter import VectorAdapter
 from blysk.hdl.core.memory import UNCOUNTED, connect_late_fifo
 from blysk.hdl.core.single_register import connect_register, hold_output
@@ -26,6 +26,7 @@ from blysk.hdl.geometry.span_adapter import LineAdapterUnit, line_spans_shape
 from blysk.hdl.geometry.span_attributes import SpanAttributesUnit
 from blysk.hdl.geometry.span_clip import SpanClipUnit
 from blysk.hdl.geometry.span_halver import SpanHalverUnit
+from blysk.hdl.geometry.surface_words import attribute_count, next_turn, placement_of
 from blysk.hdl.geometry.triangles import counters_shape, frame_shape, triangle_shape
 from blysk.hdl.geometry.vector_adapter import VectorAdapterUnit, vector_spans_shape
 from blysk.hdl.geometry.vertex_sort import VertexSortUnit, sorted_triangle_shape
@@ -38,6 +39,12 @@ PORT_DESCRIPTIONS = {
     "start": "N/W at the first pixel, in the frame of the light",
     "step": "its step to the next pixel, times 2^exponent",
     "exponent": "exponent of the step",
+    "attributes_start": "attributes of the surface at the first pixel, times s; then s",
+    "attributes_step": "their steps to the next pixel, times 2^attributes_exponent",
+    "attributes_exponent": "exponent of these steps, 0 to 9",
+    "attributes_base": "whole texel from which u or v counts",
+    "attributes_range": "a coordinate is base + attribute times 2^range texels of the level",
+    "attributes_level": "level of the texture",
     "line_left": "N/W at the first pixel",
     "line_right": "N/W at the last pixel",
     "x": "column of the first pixel",
@@ -76,29 +83,29 @@ class _TriangleSetup(wiring.Component):
 
     Parameters
     ----------
-    grid : Grid
-        Fraction bits of the coordinates.
+    model : Geometry
+        Bit-accurate model.
     compact : bool
         Whether the unit has the compact style.
-    cuts : bool
-        Whether spans are cut.
     """
 
-    def __init__(self, grid: Grid, compact: bool, cuts: bool):
+    def __init__(self, model: Geometry, compact: bool):
         self._compact, skid = compact, not compact
-        self._serialiser = AttributeSerialiserUnit(skid)
+        grid, surface, cuts = model.grid, model.surface, not (model.lines or model.vectors)
+        self._count = attribute_count(surface)
+        self._serialiser = AttributeSerialiserUnit(skid, surface)
         self._edges = EdgeSetupUnit(grid, 1 if compact else 3, 2, skid=skid)
         interval = self._edges.initiation_interval
         self._planes = PlaneSetupUnit(grid, interval, skid)
         self._gradients = GradientSetupUnit(_COMPACT_GRADIENT if compact else interval // ATTRIBUTES)
-        self.interval = max(interval, ATTRIBUTES * self._gradients.initiation_interval)
-        self._assembler = PlaneAssemblerUnit(PlaneAssembler(cuts=cuts), serial=compact)
+        self.interval = max(interval, self._count * self._gradients.initiation_interval)
+        self._assembler = PlaneAssemblerUnit(PlaneAssembler(cuts=cuts), compact, self._count)
         self.multipliers = self._planes.multipliers + self._gradients.multipliers
         super().__init__(
             {
-                "i": In(stream.Signature(sorted_triangle_shape(grid))),
+                "i": In(stream.Signature(sorted_triangle_shape(grid, surface))),
                 "walks": Out(stream.Signature(walk_shape(grid))),
-                "planes": Out(stream.Signature(plane_shape() if compact else planes_shape())),
+                "planes": Out(stream.Signature(plane_shape() if compact else planes_shape(self._count))),
                 "constants": In(frame_shape()),
                 "sliver": Out(1),
             }
@@ -117,7 +124,7 @@ class _TriangleSetup(wiring.Component):
             m.d.comb += copy_fields(to, drawn.payload)
 
         # Largest number of triangles whose edges wait for their planes at once.
-        delay = planes.latency + self._gradients.latency + ATTRIBUTES * self._gradients.initiation_interval
+        delay = planes.latency + self._gradients.latency + self._count * self._gradients.initiation_interval
         inside = delay // self.interval + 3
         corners, walks = _between("corners", planes.i), _between("walk", self.walks)
         _fork(m, edges.o, corners, walks)
@@ -133,20 +140,20 @@ class _TriangleSetup(wiring.Component):
 
         ahead = (edges.latency + planes.latency) // self.interval + 3
         attributes, scales = _between("attribute", serialiser.o), _between("scale", planes.o)
-        depth = ATTRIBUTES * ahead
+        depth = self._count * ahead
         if not self._compact:
             depth = max(depth + UNCOUNTED, BLOCK_WORDS)
         connect_late_fifo(m, "waiting_attributes", serialiser.o, attributes, depth)
         # The plane setup goes on with the next triangle while the gradients of this one are computed.
         connect_register(m, "waiting_scale", planes.o, scales)
-        to, turn = self._gradients.i, Signal(range(ATTRIBUTES), name="turn")
+        to, turn = self._gradients.i, Signal(range(self._count), name="turn")
         moves = to.valid & to.ready
         with m.If(moves):
-            m.d.sync += turn.eq(turn + 1)
+            m.d.sync += turn.eq(next_turn(turn, self._count))
         m.d.comb += [
             to.valid.eq(attributes.valid & scales.valid),
             attributes.ready.eq(to.ready & scales.valid),
-            scales.ready.eq(moves & (turn == ATTRIBUTES - 1)),
+            scales.ready.eq(moves & (turn == self._count - 1)),
             *copy_fields(to.payload, attributes.payload, serial_attribute_shape().members),
             *copy_fields(to.payload, scales.payload, scales_shape()),
         ]
@@ -173,17 +180,19 @@ class GeometryUnit(wiring.Component):
     takes:
 
     - in the setup `interval` cycles if it is drawn: 16, or 48 in the compact style, and half as many with two
-      lanes. A triangle that the sort drops takes 4 to 9 cycles, or 5 to 15 in the compact style
-      (`VertexSortUnit`);
-    - in the walk one cycle for each scanline without pixels in the picture;
+      lanes. Each attribute of a surface, and its 1/W, adds 4 cycles, or 12 in the compact style. A triangle
+      that the sort drops takes 4 to 9 cycles, or 5 to 15 in the compact style (`VertexSortUnit`);
+    - in the walk `row_cycles` for each scanline without pixels in the picture: 1, or the number of attributes
+      in the compact style;
     - for a span, or a piece of it, of p pixels as many cycles as ``p - 1`` has bits. The least is 1 cycle for
       1 pixel, 2 cycles for 2 pixels and 3 cycles for more. With ``lines`` or ``vectors`` the least is 1 cycle
       for any number of pixels. A span never takes more cycles than it has pixels. If n pixels are cut off at
       the long edge, the scanline takes one more cycle for each bit of n. In the compact style a scanline
-      takes four cycles, and four more for every two of these bits. At the same time the normals take three
-      cycles each. With ``vectors`` a span takes two more cycles each time that it does not fit, and for each
-      piece behind the first (`SpanHalverUnit`). In the compact style a piece takes 13 cycles or more at the
-      same time (`SerialVectorsUnit`).
+      takes a cycle for each attribute, four without a surface, and as many more for every two of these bits.
+      At the same time the normals take three cycles each. With ``vectors`` a span takes two more cycles each
+      time that it does not fit, and for each piece behind the first (`SpanHalverUnit`). In the compact style
+      a piece takes 13 cycles or more at the same time, and with a surface 3 more for each of its attributes
+      (`SerialVectorsUnit`).
 
     The number of multipliers is `multipliers`: 10, or 5 in the compact style. With ``lines`` or ``vectors``
     it is 4, or 2 in the compact style. The second lane adds 4, or 2 in the compact style.
@@ -198,7 +207,7 @@ class GeometryUnit(wiring.Component):
 
     Members
     -------
-    i : :py:`In(stream.Signature(triangle_shape(grid)))`
+    i : :py:`In(stream.Signature(triangle_shape(grid, model.surface)))`
         Triangles.
     o : :py:`Out(stream.Signature(true_spans_shape()))`
         Spans of the triangles. With ``lines`` in `line_spans_shape`, with ``vectors`` in
@@ -219,34 +228,36 @@ class GeometryUnit(wiring.Component):
     def __init__(self, model: Geometry | None = None, build: Build | None = None):
         self.model, build = model or Geometry(), build or Build(top="geometry")
         self.grid, self.compact = self.model.grid, build.compact_geometry
+        self.row_cycles = attribute_count(self.model.surface) if self.compact else 1
         self.lines, self.vectors = self.model.lines, self.model.vectors
         self.rotates = self.model.rotates
         grid, compact, lines, vectors = self.grid, self.compact, self.lines, self.vectors
-        self._sort = VertexSortUnit(grid, compact)
-        self._lanes = [_TriangleSetup(grid, compact, not (lines or vectors)) for _ in range(build.setups)]
+        self._surface = surface = self.model.surface
+        self._sort = VertexSortUnit(grid, compact, surface)
+        self._lanes = [_TriangleSetup(self.model, compact) for _ in range(build.setups)]
         self.interval = -(-self._lanes[0].interval // build.setups)
         self._attributes, self._walk, self._clip = (
-            SpanAttributesUnit(compact, vectors),
+            SpanAttributesUnit(compact, vectors, surface),
             EdgeWalkUnit(grid, skid=not compact),
             SpanClipUnit(skid=not compact),
         )
         if lines:
             self._normals, shape = LineAdapterUnit(), line_spans_shape()
         elif vectors:
-            shape = vector_spans_shape()
+            shape = vector_spans_shape(surface)
             if compact:
                 # One unit cuts spans and makes their words.
-                self._normals = self._halver = SerialVectorsUnit(self.rotates)
+                self._normals = self._halver = SerialVectorsUnit(self.rotates, surface)
             else:
-                self._normals = VectorAdapterUnit(VectorAdapter(self.rotates))
-                self._halver = SpanHalverUnit(SpanHalver(self.rotates))
+                self._normals = VectorAdapterUnit(VectorAdapter(self.rotates), surface)
+                self._halver = SpanHalverUnit(SpanHalver(self.rotates), surface)
         else:
             self._normals, shape = EdgeNormalsUnit(compact=compact), true_spans_shape()
         normaliser = 0 if lines or vectors else self._normals.multipliers
         self.multipliers = sum(lane.multipliers for lane in self._lanes) + normaliser
         super().__init__(
             {
-                "i": In(stream.Signature(triangle_shape(grid))),
+                "i": In(stream.Signature(triangle_shape(grid, surface))),
                 "o": Out(stream.Signature(shape)),
                 "constants": In(frame_shape()),
                 "status": Out(counters_shape(*COUNTERS)),
@@ -286,6 +297,7 @@ class GeometryUnit(wiring.Component):
             connect(m, self._sort.o, drawn)
         else:
             connect_late_fifo(m, "waiting_triangles", self._sort.o, drawn, WAITING_TRIANGLES)
+        drawn = self._put_placement_aside(m, drawn)
         lanes = self._lanes
         if len(lanes) == 1:
             connect(m, drawn, lanes[0].i)
@@ -312,6 +324,19 @@ class GeometryUnit(wiring.Component):
             merged.append(joined)
         return tuple(merged)
 
+    def _put_placement_aside(self, m: Module, drawn: stream.Interface) -> stream.Interface:
+        """Sorted triangles. The place of their textures waits in a FIFO until the triangle is walked."""
+        members, self._placements = placement_of(self._surface), None
+        if not members:
+            return drawn
+        goes = _between("placed", drawn)
+        waits = stream.Signature(data.StructLayout(members))
+        entering, self._placements = waits.create(path=("placement",)), waits.create(path=("placement_out",))
+        _fork(m, drawn, goes, entering)
+        m.d.comb += [copy(goes.payload, drawn.payload), *copy_fields(entering.payload, drawn.payload)]
+        connect_late_fifo(m, "placements", entering, self._placements, BLOCK_WORDS)
+        return goes
+
     def _walk_planes(self, m: Module, planes: stream.Interface) -> stream.Interface:
         """Connect scanlines and planes to the attributes; a triangle's first scanline waits for its planes.
 
@@ -329,17 +354,26 @@ class GeometryUnit(wiring.Component):
         with m.If(rows.valid & rows.ready):
             m.d.sync += first.eq(rows.payload.last)
         if self.compact:
-            lane = Signal(range(ATTRIBUTES), name="lane")
+            count = attribute_count(self._surface)
+            lane = Signal(range(count), name="lane")
             with m.If(to.valid & to.ready):
-                m.d.sync += lane.eq(lane + 1)
-            ends = lane == ATTRIBUTES - 1
+                m.d.sync += lane.eq(next_turn(lane, count))
+            ends = lane == count - 1
         m.d.comb += [
             copy(to.payload.planes, planes.payload),
-            copy(to.payload.row, rows.payload),
             to.valid.eq(rows.valid & (planes.valid | ~first)),
             rows.ready.eq(to.ready & (planes.valid | ~first) & ends),
             planes.ready.eq(to.ready & rows.valid & first),
         ]
+        if self._placements is None:
+            m.d.comb += copy(to.payload.row, rows.payload)
+        else:
+            # The planes of a triangle come many cycles after its placement.
+            m.d.comb += [
+                *copy_fields(to.payload.row, rows.payload, rows.payload.shape().members),
+                *copy_fields(to.payload.row, self._placements.payload, placement_of(self._surface)),
+                self._placements.ready.eq(rows.valid & rows.ready & rows.payload.last),
+            ]
         return rows
 
     def _watch(self, m: Module, rows: stream.Interface) -> None:

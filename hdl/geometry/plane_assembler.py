@@ -11,6 +11,7 @@ from blysk.golden.geometry.triangles import ATTRIBUTES, LIMIT_BITS
 from blysk.hdl.core.fixed import FixedShape
 from blysk.hdl.core.views import copy
 from blysk.hdl.geometry.gradient_setup import gradient_shape
+from blysk.hdl.geometry.surface_words import next_turn
 from blysk.hdl.geometry.triangles import frame_shape
 
 __all__ = ["PIECE_BITS", "PlaneAssemblerUnit", "plane_shape", "planes_shape"]
@@ -21,12 +22,12 @@ PIECE_BITS = 4
 _WORDS = ("start", "short", "long", "inward")
 
 
-def planes_shape() -> data.StructLayout:
-    """Shape of `Planes.beats`: gradients of four attributes, and the exponent of a piece."""
+def planes_shape(count: int = ATTRIBUTES) -> data.StructLayout:
+    """Shape of `Planes.beats`: gradients of ``count`` attributes, and the exponent of a piece."""
     p = GradientSetup
-    four = {name: data.ArrayLayout(FixedShape(p.FORMAT), ATTRIBUTES) for name in _WORDS[1:]}
-    start = {"start": data.ArrayLayout(FixedShape(p.START_FORMAT), ATTRIBUTES)}
-    return data.StructLayout(start | four | {"piece": unsigned(PIECE_BITS)})
+    steps = {name: data.ArrayLayout(FixedShape(p.FORMAT), count) for name in _WORDS[1:]}
+    start = {"start": data.ArrayLayout(FixedShape(p.START_FORMAT), count)}
+    return data.StructLayout(start | steps | {"piece": unsigned(PIECE_BITS)})
 
 
 def plane_shape() -> data.StructLayout:
@@ -37,11 +38,11 @@ def plane_shape() -> data.StructLayout:
 
 
 class PlaneAssemblerUnit(wiring.Component):
-    """Collects four gradients, and finds ``piece``. `PlaneAssembler` is the bit-accurate model.
+    """Collects the gradients of a triangle, and finds ``piece``. `PlaneAssembler` is the bit-accurate model.
 
     The first gradient of a triangle starts the product of bound and limit, which takes two bits of the limit
     a cycle. The third gradient starts the search for ``piece``, which finds one bit a cycle. If gradients are
-    at least 4 cycles apart, a triangle is offered 3 cycles after its fourth gradient was taken in. One cycle
+    at least 4 cycles apart, a triangle is offered 3 cycles after its last gradient was taken in. One cycle
     after the offer the first gradient of the next triangle can be taken in. So gradients that come every four
     cycles never wait. If spans are not cut, there is neither product nor search. The unit has no multipliers.
 
@@ -53,12 +54,14 @@ class PlaneAssemblerUnit(wiring.Component):
         Bit-accurate model.
     serial : bool
         Whether attributes are offered one after the other.
+    count : int
+        Attributes of a triangle, 4 or more.
 
     Members
     -------
     i : :py:`In(stream.Signature(gradient_shape()))`
-        Gradients of N/W by component, then of the depth.
-    o : :py:`Out(stream.Signature(planes_shape()))`
+        Gradients of N/W by component, then of the depth and of the surface.
+    o : :py:`Out(stream.Signature(planes_shape(count)))`
         Planes of triangles. If ``serial``, the plane of one attribute at a time, in `plane_shape`.
     constants : :py:`In(frame_shape())`
         The frame, of which the unit reads ``limit``. Constant while triangles are inside.
@@ -66,12 +69,12 @@ class PlaneAssemblerUnit(wiring.Component):
     Source: docs/theory/geometry.md#normals; not in the documents.
     """
 
-    def __init__(self, model: PlaneAssembler | None = None, serial: bool = False):
-        self.model, self.serial = model or PlaneAssembler(), serial
+    def __init__(self, model: PlaneAssembler | None = None, serial: bool = False, count: int = ATTRIBUTES):
+        self.model, self.serial, self.count = model or PlaneAssembler(), serial, count
         super().__init__(
             {
                 "i": In(stream.Signature(gradient_shape())),
-                "o": Out(stream.Signature(plane_shape() if serial else planes_shape())),
+                "o": Out(stream.Signature(plane_shape() if serial else planes_shape(count))),
                 "constants": In(frame_shape()),
             }
         )
@@ -79,12 +82,12 @@ class PlaneAssemblerUnit(wiring.Component):
     def elaborate(self, platform):
         """Collected words, bound times limit, sum and maximum of the sizes, and the search."""
         m = Module()
-        gradient, result = self.i.payload, Signal(planes_shape(), name="result")
-        count, full, accept = Signal(2, name="count"), Signal(name="full"), Signal()
+        gradient, result = self.i.payload, Signal(planes_shape(self.count), name="result")
+        count, full, accept = Signal(range(self.count), name="count"), Signal(name="full"), Signal()
         m.d.comb += [self.i.ready.eq(~full), accept.eq(self.i.valid & ~full)]
         moves, ends = self.o.valid & self.o.ready, 1
         with m.If(accept):
-            m.d.sync += [count.eq(count + 1), full.eq(count == ATTRIBUTES - 1)]
+            m.d.sync += [count.eq(next_turn(count, self.count)), full.eq(count == self.count - 1)]
         with m.If((accept | moves) if self.serial else accept):
             for name in _WORDS:
                 words = [Value.cast(word) for word in result[name]]
@@ -103,10 +106,10 @@ class PlaneAssemblerUnit(wiring.Component):
         if self.serial:
             m.d.comb += [self.o.payload[name].eq(result[name][0]) for name in _WORDS]
             m.d.comb += self.o.payload.piece.eq(result.piece)
-            given = Signal(range(ATTRIBUTES), name="given")
+            given = Signal(range(self.count), name="given")
             with m.If(moves):
-                m.d.sync += given.eq(given + 1)
-            ends = given == ATTRIBUTES - 1
+                m.d.sync += given.eq(next_turn(given, self.count))
+            ends = given == self.count - 1
         else:
             m.d.comb += copy(self.o.payload, result)
         m.d.sync += offers.eq(full & found & ~(moves & ends))

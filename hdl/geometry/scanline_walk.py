@@ -8,7 +8,8 @@ from amaranth.hdl import Const, Module, Mux, Signal, Value, ValueLike
 from amaranth.lib import stream
 
 from blysk.golden.geometry.gradient_setup import GradientSetup
-from blysk.golden.geometry.triangles import ATTRIBUTES, PIXEL_BITS
+from blysk.golden.geometry.triangles import PIXEL_BITS
+from blysk.hdl.geometry.surface_words import next_turn
 
 __all__ = ["AttributeRing", "AttributeTurns", "ScanlineWalk"]
 
@@ -16,18 +17,24 @@ _BITS = GradientSetup.FORMAT.width
 
 
 class AttributeTurns:
-    """Control of the turns of attributes: all attributes on one cycle, or *serially* in four turns.
+    """Control of the turns of ``count`` attributes: all on one cycle, or *serially* in as many turns.
 
-    In the serial form the first attribute decides for all four whether a scanline comes in. The control of
+    In the serial form the first attribute decides for all of them whether a scanline comes in. The control of
     the walk moves on with the last attribute, `ends`. With ``ahead`` registers tell whether the walk
     advances.
     """
 
-    def __init__(self, m: Module, rows: stream.Interface, busy: Signal, serial: bool, ahead: bool):
-        self.serial, self.row_valid = serial, rows.valid
+    def __init__(
+        self, m: Module, rows: stream.Interface, busy: Signal, serial: bool, ahead: bool, count: int
+    ):
+        self.serial, self.row_valid, self.count = serial, rows.valid, count
         ahead &= serial
         self.advance, self.leaves = Signal(name="advance", init=ahead), Signal(name="would_leave")
-        self.lane, self.ends, self.steps = Signal(2, name="lane"), Signal(name="ends"), Signal(name="steps")
+        self.lane, self.ends, self.steps = (
+            Signal(range(count), name="lane"),
+            Signal(name="ends"),
+            Signal(name="steps"),
+        )
         # ``accepts``: a scanline comes in, on a step of each attribute; ``goes``: the control moves on;
         # ``takes``: it takes a scanline; ``loads``: it takes a scanline with pixels.
         self.accepts, self.goes, self.takes = (Signal(name=name) for name in ("accepts", "goes", "takes"))
@@ -45,7 +52,7 @@ class AttributeTurns:
             rows.ready.eq(Mux(first, opens, taken) & moves),
             self.accepts.eq(Mux(first, rows.valid & opens, taken)),
             self.steps.eq(moves & Mux(first, busy | self.accepts, ~taken | rows.valid)),
-            self.ends.eq(self.lane == ATTRIBUTES - 1),
+            self.ends.eq(self.lane == count - 1),
             self.goes.eq(self.ends & moves & (~taken | rows.valid)),
             self.takes.eq(taken),
             self.loads.eq(taken & (has_pixels := Signal(name="has_pixels"))),
@@ -61,7 +68,7 @@ class AttributeTurns:
         else:
             m.d.comb += moves.eq(~busy | self.advance)
         with m.If(self.steps):
-            m.d.sync += [self.lane.eq(self.lane + 1), taken.eq(self.accepts)]
+            m.d.sync += [self.lane.eq(next_turn(self.lane, count)), taken.eq(self.accepts)]
 
     def late(self, m: Module, value: ValueLike, name: str) -> Value:
         """In the *serial* form the value on the step before, from a register. Else the value itself."""
@@ -87,7 +94,7 @@ class AttributeRing:
             self._next, self._domain = Signal(_BITS, name=f"{name}_next"), "comb"
             stays = turns.late(m, self.value, f"{name}_stays") if late else self.value
             m.d.comb += self._next.eq(stays)
-            ring = [self.value, *(Signal(_BITS, name=f"{name}_{k}") for k in range(1, ATTRIBUTES - late))]
+            ring = [self.value, *(Signal(_BITS, name=f"{name}_{k}") for k in range(1, turns.count - late))]
             with m.If(turns.steps):
                 m.d.sync += [
                     word.eq(other) for word, other in zip(ring, [*ring[1:], self._next], strict=True)

@@ -6,14 +6,26 @@ from amaranth.hdl import Cat, Const, Module, Mux, Signal, Value
 from amaranth.lib import data, stream, wiring
 from amaranth.lib.wiring import In, Out
 
+from blysk.golden.albedo.attribute_spans import AttributeSpans
 from blysk.golden.geometry.span_attributes import SPAN_NORMAL, SPAN_STEP
 from blysk.golden.geometry.span_halver import SpanHalver
+from blysk.golden.geometry.surface_words import SurfaceWords
 from blysk.golden.geometry.triangles import ATTRIBUTES, PIXEL_BITS
 from blysk.golden.geometry.vector_adapter import VectorAdapter
 from blysk.hdl.core.bits import select
 from blysk.hdl.core.views import copy
 from blysk.hdl.geometry.span_attributes import whole_span_shape
 from blysk.hdl.geometry.span_halver import is_apart, is_kept, shorter, size_of
+from blysk.hdl.geometry.surface_words import (
+    STEP_BITS,
+    attribute_count,
+    next_turn,
+    placement_of,
+    surface_count,
+    surface_exponent,
+    surface_step,
+    used_step,
+)
 from blysk.hdl.geometry.triangles import count_events, counters_shape
 from blysk.hdl.geometry.vector_adapter import exponent_of, rounded, shift_of, used_bits, vector_spans_shape
 
@@ -25,31 +37,35 @@ _WIDTH = SPAN_STEP.width
 class SerialVectorsUnit(wiring.Component):
     """Does the work of `SpanHalverUnit` and `VectorAdapterUnit` on one attribute a cycle, with equal results.
 
-    The four attributes of a span are in rings that turn by one attribute a cycle.
+    The n attributes of a span are in rings that turn by one attribute a cycle. n is 4, and more with a
+    surface.
 
-    1. A span comes in four turns. The turns also find the span's shift. They test whether the span fits, with
-       the shift of the piece before. If the span's own shift differs, four more turns test again.
-    2. Four turns find the exponent of the step.
-    3. Four turns give the start.
-    4. Four turns give the step, while the next span, or the rest of this span, comes in.
+    1. A span comes in n turns. The turns also find the span's shift. They test whether the span fits, with
+       the shift of the piece before. If the span's own shift differs, n more turns test again.
+    2. n turns find the exponents of the steps.
+    3. n turns give the start.
+    4. n turns give the step, while the next span, or the rest of this span, comes in.
 
-    Each component of a vector goes through one shifter, a subtraction, another shifter and a rounding.
+    Each component of a vector goes through one shifter, a subtraction, another shifter and a rounding. An
+    attribute of the surface goes through one shifter.
 
-    A piece takes 13 cycles. Each time that it does not fit, it takes six more cycles. Each time that its
-    shift differs from the shift before, it takes five more cycles. Steps 3 and 4 of the next piece begin when
-    this piece has been taken. Steps 1 and 2 go on meanwhile. A span that fits is offered at most `latency`
-    cycles after its last attribute was taken. The unit has no multipliers.
+    A piece takes ``3 n + 1`` cycles, 13 with four attributes. Each time that it does not fit, it takes n + 2
+    more cycles. Each time that its shift differs from the shift before, it takes n + 1 more cycles. Steps 3
+    and 4 of the next piece begin when this piece has been taken. Steps 1 and 2 go on meanwhile. A span that
+    fits is offered at most `latency` cycles after its last attribute was taken. The unit has no multipliers.
 
     Parameters
     ----------
     rotates : bool
         As in `SpanHalver` and `VectorAdapter`.
+    surface : AttributeSpans or None
+        Attributes of the surface that triangles bring.
 
     Members
     -------
-    i : :py:`In(stream.Signature(whole_span_shape()))`
-        Attributes of spans, four beats a span, from a `SpanAttributesUnit` that is serial and ``whole``.
-    o : :py:`Out(stream.Signature(vector_spans_shape()))`
+    i : :py:`In(stream.Signature(whole_span_shape(surface)))`
+        Attributes of spans, n beats a span, from a `SpanAttributesUnit` that is serial and ``whole``.
+    o : :py:`Out(stream.Signature(vector_spans_shape(surface)))`
         Pieces, as from `VectorAdapterUnit`.
     status : :py:`Out(counters_shape("cut"))`
         Number of spans that were cut, since the reset.
@@ -62,14 +78,14 @@ class SerialVectorsUnit(wiring.Component):
     Source: docs/theory/geometry.md#composition; not in the documents.
     """
 
-    latency = 22
-
-    def __init__(self, rotates: bool = False):
-        self.rotates = rotates
+    def __init__(self, rotates: bool = False, surface: AttributeSpans | None = None):
+        self.rotates, self._surface = rotates, surface
+        self._count = attribute_count(surface)
+        self.latency = 3 * self._count + 8 + self._final
         super().__init__(
             {
-                "i": In(stream.Signature(whole_span_shape())),
-                "o": Out(stream.Signature(vector_spans_shape())),
+                "i": In(stream.Signature(whole_span_shape(surface))),
+                "o": Out(stream.Signature(vector_spans_shape(surface))),
                 "status": Out(counters_shape("cut")),
             }
         )
@@ -84,7 +100,7 @@ class SerialVectorsUnit(wiring.Component):
         loads, settles, repeats, tests, starts, steps, renews = (
             Signal(name=name, init=name == "loads") for name in names
         )
-        place, overlaps = Signal(2, name="place"), Signal(name="overlaps")
+        place, overlaps = Signal(range(self._count), name="place"), Signal(name="overlaps")
         turns, ends, whole = (Signal(name=name) for name in ("turns", "ends", "whole"))
         fits, agrees = Signal(name="fits"), Signal(name="agrees")
         begins, decides, retries = ~place.any(), Signal(name="decides"), Signal(name="retries")
@@ -95,11 +111,11 @@ class SerialVectorsUnit(wiring.Component):
             decides.eq(tests & begins),
             retries.eq(decides & ~fits),
             turns.eq(~settles & ~retries & ~(starts & begins & leaving) & (~comes | self.i.valid)),
-            ends.eq(turns & place.all()),
+            ends.eq(turns & self._is_last(place)),
             self.i.ready.eq(loads | (steps & Mux(begins, whole, overlaps))),
         ]
         with m.If(turns):
-            m.d.sync += [place.eq(place + 1), overlaps.eq(comes)]
+            m.d.sync += [place.eq(next_turn(place, self._count)), overlaps.eq(comes)]
         # The rest of a span behind a piece is made in the turns that give the step.
         rest_goes = steps & ~whole
         with m.If(ends | settles | retries):
@@ -121,13 +137,26 @@ class SerialVectorsUnit(wiring.Component):
         shift = self._test(m, heads, kinds, place, pixels, (fits, agrees))
         kinds = tests, starts & turns, steps, turns
         self._words(m, heads, kinds, place, shift, tag, words)
+        if self._surface is not None:
+            self._surface_words(m, heads, kinds, place, tag)
         count_events(m, self.status, cut=retries & uncut)
-        with m.If(turns & steps & (place == 2)):
+        with m.If(turns & steps & (place == self._final)):
             m.d.sync += leaving.eq(1)
         with m.Elif(self.o.valid & self.o.ready):
             m.d.sync += leaving.eq(0)
         m.d.comb += self.idle.eq(loads & begins & ~leaving)
         return m
+
+    @property
+    def _final(self) -> int:
+        """Place of the last attribute that a piece has in step 4."""
+        return ATTRIBUTES - 2 if self._surface is None else self._count - 1
+
+    def _is_last(self, place: Signal):
+        return place.all() if 1 << len(place) == self._count else place == self._count - 1
+
+    def _is_component(self, place: Signal):
+        return ~place.all() if self._surface is None else place < ATTRIBUTES - 1
 
     def _rings(self, m: Module, turns, comes, renews, odd, leaves) -> dict[str, Signal]:
         """Rings of the near, far and last ends and of the steps. Returns their first words.
@@ -136,7 +165,7 @@ class SerialVectorsUnit(wiring.Component):
         """
         given = self.i.payload
         rings = {
-            name: [Signal(_WIDTH, name=f"{name}_{k}", reset_less=True) for k in range(ATTRIBUTES)]
+            name: [Signal(_WIDTH, name=f"{name}_{k}", reset_less=True) for k in range(self._count)]
             for name in ("near", "far", "last", "step")
         }
         near, far, last, step = (ring[0] for ring in rings.values())
@@ -167,7 +196,7 @@ class SerialVectorsUnit(wiring.Component):
         (whole, odd), given = flags, self.i.payload
         tag = {
             name: Signal.like(Value.cast(given[name]), name=name, reset_less=True)
-            for name in ("y", "right", "flip", "material")
+            for name in ("y", "right", "flip", "material", *placement_of(self._surface))
         }
         x, left, pixels = (Signal(PIXEL_BITS, name=name, reset_less=True) for name in ("x", "left", "pixels"))
         uncut, rest = Signal(name="uncut"), (left - pixels)[:PIXEL_BITS]
@@ -192,7 +221,7 @@ class SerialVectorsUnit(wiring.Component):
         The test uses the shift of the piece before. If the piece's own shift differs, the piece is tested
         again.
         """
-        (comes, settles), is_component, (fits, agrees) = kinds, ~place.all(), results
+        (comes, settles), is_component, (fits, agrees) = kinds, self._is_component(place), results
         bits, places = SpanHalver.BITS, SpanHalver.LARGEST_SHIFT
 
         # ``came`` and ``first`` belong to a word that came on the cycle before.
@@ -254,7 +283,8 @@ class SerialVectorsUnit(wiring.Component):
 
         Also send the depths and the words that pass unchanged.
         """
-        p, is_component = VectorAdapter(self.rotates), ~place.all()
+        p, is_component = VectorAdapter(self.rotates), self._is_component(place)
+        is_depth = ~is_component if self._surface is None else place == ATTRIBUTES - 1
         (tests, starts, steps, turns), right = kinds, tag["right"]
         bits, low = p.STEP_BITS + 1, SPAN_STEP.fraction_bits - SPAN_NORMAL.fraction_bits
         note = data.StructLayout({"finds": 1, "is_start": 1, "gives": 1, "first": 1, "last": 1})
@@ -265,7 +295,7 @@ class SerialVectorsUnit(wiring.Component):
             now.is_start.eq(starts & is_component),
             now.gives.eq((starts | (steps & turns)) & is_component),
             now.first.eq(~place.any()),
-            now.last.eq(steps & turns & (place == 2)),
+            now.last.eq(steps & turns & (place == self._final)),
         ]
 
         def register(value, name):
@@ -311,9 +341,9 @@ class SerialVectorsUnit(wiring.Component):
         with m.If(now.is_start & now.first):
             m.d.sync += [flip.eq(tag["flip"]), step_flip.eq(tag["flip"] ^ right)]
             m.d.sync += [result[name].eq(word) for name, word in words.items()]
-        with m.If(starts & ~is_component):
+        with m.If(starts & is_depth):
             m.d.sync += Value.cast(result.depth).eq(Cat(value[:-1], ~value[-1]))
-        with m.If(steps & ~is_component):
+        with m.If(steps & is_depth):
             m.d.sync += Value.cast(result.depth_step).eq(Mux(right, -step, step)[: len(step)])
         there = Signal(name="there")
         with m.If(notes[4].last):
@@ -324,4 +354,44 @@ class SerialVectorsUnit(wiring.Component):
             self.o.valid.eq(there),
             copy(self.o.payload, result),
             self.o.payload.exponent.eq(exponent),
+        ]
+
+    def _surface_words(self, m: Module, heads, kinds, place, tag) -> None:
+        """Send each attribute of the surface through the shift of its step, in the turns behind the depth."""
+        (tests, starts, steps, turns), right = kinds, tag["right"]
+        is_surface, result = place >= ATTRIBUTES, self.o.payload.attributes
+        start, step = Mux(right, heads["far"], heads["near"]), heads["step"]
+        moved = Signal(STEP_BITS, name="surface_moved")
+        m.d.comb += moved.eq(Mux(right, -step, step))
+        used = Signal(SurfaceWords.LARGEST_EXPONENT, name="surface_used", reset_less=True)
+        with m.If(tests & is_surface):
+            m.d.sync += used.eq(Mux(place == ATTRIBUTES, 0, used) | used_step(moved))
+        found = surface_exponent(used)
+        exponent = Signal(len(found), name="surface_exponent", reset_less=True)
+        held = {
+            name: Signal(shape, name=f"surface_{name}", reset_less=True)
+            for name, shape in placement_of(self._surface).items()
+        }
+        with m.If(starts & turns & ~place.any()):
+            m.d.sync += [exponent.eq(found), *(Value.cast(held[name]).eq(tag[name]) for name in held)]
+        code, shift = Signal(STEP_BITS, name="surface_code"), Signal(len(found), name="surface_shift")
+        gives = Signal(name="surface_gives")
+        m.d.sync += [
+            code.eq(Mux(starts, start, moved)),
+            shift.eq(Mux(starts, 0, exponent)),
+            gives.eq((starts | steps) & turns & is_surface),
+        ]
+        count, word = surface_count(self._surface), surface_step(code, shift)
+        ring = [
+            Signal(len(word), name=f"surface_{name}_{k}", reset_less=True)
+            for name in ("start", "step")
+            for k in range(count)
+        ]
+        with m.If(gives):
+            m.d.sync += [target.eq(source) for target, source in pairwise([*ring, word])]
+        m.d.comb += [
+            Value.cast(result.start).eq(Cat(ring[:count])),
+            Value.cast(result.step).eq(Cat(ring[count:])),
+            result.exponent.eq(exponent),
+            *(Value.cast(result[name]).eq(Value.cast(word)) for name, word in held.items()),
         ]

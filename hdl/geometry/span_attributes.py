@@ -4,6 +4,7 @@ from amaranth.hdl import Cat, Const, Module, Mux, Signal, Value, unsigned
 from amaranth.lib import data, stream, wiring
 from amaranth.lib.wiring import In, Out
 
+from blysk.golden.albedo.attribute_spans import AttributeSpans
 from blysk.golden.geometry.gradient_setup import GradientSetup
 from blysk.golden.geometry.span_attributes import DEPTH_STEP, SPAN_DEPTH, SPAN_NORMAL, SPAN_STEP
 from blysk.golden.geometry.triangles import ATTRIBUTES, MATERIAL_BITS, PIXEL_BITS
@@ -14,6 +15,7 @@ from blysk.hdl.core.views import copy, copy_fields
 from blysk.hdl.geometry.plane_assembler import plane_shape, planes_shape
 from blysk.hdl.geometry.scanline_walk import AttributeRing, AttributeTurns, ScanlineWalk
 from blysk.hdl.geometry.span_clip import clipped_rows_shape
+from blysk.hdl.geometry.surface_words import attribute_count, placement_of
 from blysk.hdl.geometry.triangles import count_events, counters_shape
 
 __all__ = [
@@ -30,13 +32,15 @@ _BITS = GradientSetup.FORMAT.width
 _WORDS = ("start", "short", "long", "inward")
 
 
-def planes_rows_shape(serial: bool = False) -> data.StructLayout:
+def planes_rows_shape(serial: bool = False, surface: AttributeSpans | None = None) -> data.StructLayout:
     """Shape of a scanline with its triangle's planes, which are read with the triangle's first scanline.
 
     With ``serial`` the shape has the plane of one attribute, and a scanline comes once for each attribute.
+    With texture coordinates a scanline has their base, range and level, too.
     """
-    planes = plane_shape() if serial else planes_shape()
-    return data.StructLayout({"planes": planes, "row": clipped_rows_shape()})
+    planes = plane_shape() if serial else planes_shape(attribute_count(surface))
+    row = data.StructLayout(clipped_rows_shape().members | placement_of(surface))
+    return data.StructLayout({"planes": planes, "row": row})
 
 
 def span_words_shape() -> dict:
@@ -53,17 +57,18 @@ def pieces_shape() -> data.StructLayout:
     return data.StructLayout({"left": normal, "right": normal} | span_words_shape())
 
 
-def whole_spans_shape() -> data.StructLayout:
+def whole_spans_shape(surface: AttributeSpans | None = None) -> data.StructLayout:
     """Shape of `WholeSpans.beats`: attributes at both ends and their step, first pixel, length, flags."""
-    words = {name: data.ArrayLayout(FixedShape(SPAN_STEP), ATTRIBUTES) for name in ("near", "far", "inward")}
+    count = attribute_count(surface)
+    words = {name: data.ArrayLayout(FixedShape(SPAN_STEP), count) for name in ("near", "far", "inward")}
     places = {name: unsigned(PIXEL_BITS) for name in ("x", "length")}
-    return data.StructLayout(words | places | _tag_shape().members)
+    return data.StructLayout(words | places | _tag_shape(surface).members)
 
 
-def whole_span_shape() -> data.StructLayout:
+def whole_span_shape(surface: AttributeSpans | None = None) -> data.StructLayout:
     """Shape of one attribute of `whole_spans_shape`, with the other words of the span."""
     words = {name: FixedShape(SPAN_STEP) for name in ("near", "far", "inward")}
-    return data.StructLayout({**whole_spans_shape().members, **words})
+    return data.StructLayout({**whole_spans_shape(surface).members, **words})
 
 
 class SpanAttributesUnit(wiring.Component):
@@ -91,10 +96,12 @@ class SpanAttributesUnit(wiring.Component):
         Whether the attributes of a scanline come and are computed one after the other.
     whole : bool
         Whether the unit gives whole spans.
+    surface : AttributeSpans or None
+        Attributes of the surface that triangles bring. Only with ``whole``.
 
     Members
     -------
-    i : :py:`In(stream.Signature(planes_rows_shape(serial)))`
+    i : :py:`In(stream.Signature(planes_rows_shape(serial, surface)))`
         Scanlines. The planes are read with the first scanline of a triangle. This is the first of all
         scanlines, or the scanline after a scanline with ``last``.
     o : :py:`Out(stream.Signature(pieces_shape()))`
@@ -111,12 +118,13 @@ class SpanAttributesUnit(wiring.Component):
     Source: docs/theory/geometry.md#normals; [T] figure 4.10 (normals along the edges).
     """
 
-    def __init__(self, serial: bool = False, whole: bool = False):
+    def __init__(self, serial: bool = False, whole: bool = False, surface: AttributeSpans | None = None):
         self.serial, self.whole, self.latency = serial, whole, (3 if whole else 6) if serial else 3 - whole
-        shape = (whole_span_shape() if serial else whole_spans_shape()) if whole else pieces_shape()
+        self._surface = surface
+        shape = (whole_span_shape if serial else whole_spans_shape)(surface) if whole else pieces_shape()
         super().__init__(
             {
-                "i": In(stream.Signature(planes_rows_shape(serial))),
+                "i": In(stream.Signature(planes_rows_shape(serial, surface))),
                 "o": Out(stream.Signature(shape)),
                 "status": Out(counters_shape("empty") if whole else counters_shape("empty", "cut")),
             }
@@ -129,11 +137,13 @@ class SpanAttributesUnit(wiring.Component):
         row, planes = self.i.payload.row, self.i.payload.planes
         first, drawn = Signal(name="first", init=1), Signal(name="drawn")
         busy, accept, loads = (Signal(name=name) for name in ("busy", "accept", "loads"))
-        mask, tag = Signal(PIXEL_BITS, name="whole_piece"), Signal(_tag_shape(), name="tag")
-        turns = AttributeTurns(m, self.i, busy, self.serial, not self.whole)
+        flags = _tag_shape(self._surface)
+        mask, tag = Signal(PIXEL_BITS, name="whole_piece"), Signal(flags, name="tag")
+        attributes = attribute_count(self._surface)
+        turns = AttributeTurns(m, self.i, busy, self.serial, not self.whole, attributes)
         m.d.comb += [accept.eq(turns.accepts), loads.eq(accept & row.covered)]
         with m.If(turns.goes & turns.loads):
-            m.d.sync += copy_fields(tag, row, ("y", "right", "flip", "material"))
+            m.d.sync += copy_fields(tag, row, flags.members)
 
         # A whole span is a single piece, so it is the last piece.
         longest = Mux(first, _mask(planes.piece), mask)
@@ -148,7 +158,7 @@ class SpanAttributesUnit(wiring.Component):
                     if self.serial:
                         # The last step of a whole piece takes one bit or two.
                         m.d.sync += walk.double.eq(~planes.piece[0] & (planes.piece != 0))
-        count = 1 if self.serial else ATTRIBUTES
+        count = 1 if self.serial else attributes
         walked = Signal(self._walked_shape(count), name="found")
         for k in range(count):
             plane = {name: planes[name] if self.serial else planes[name][k] for name in _WORDS}
@@ -199,19 +209,17 @@ class SpanAttributesUnit(wiring.Component):
             m.d.sync += result_valid.eq(valid & walked.ends)
             self._convert(m, valid, walked, result)
 
-    @staticmethod
-    def _whole(walked, result) -> list:
+    def _whole(self, walked, result) -> list:
         """A whole span from the walk's words, or one attribute of the span."""
         words = (("near", walked.near), ("far", walked.far), ("inward", walked.step))
         places = copy_fields(result, walked, ("x", "length"))
-        tag = copy_fields(result, walked.tag, _tag_shape().members)
+        tag = copy_fields(result, walked.tag, _tag_shape(self._surface).members)
         return [*(Value.cast(result[name]).eq(word) for name, word in words), *places, *tag]
 
-    @staticmethod
-    def _walked_shape(count: int) -> data.StructLayout:
+    def _walked_shape(self, count: int) -> data.StructLayout:
         words = {name: data.ArrayLayout(unsigned(_BITS), count) for name in ("near", "far", "step")}
         places = {"x": unsigned(PIXEL_BITS), "length": unsigned(PIXEL_BITS)}
-        return data.StructLayout(words | places | {"tag": _tag_shape(), "ends": unsigned(1)})
+        return data.StructLayout(words | places | {"tag": _tag_shape(self._surface), "ends": unsigned(1)})
 
     @staticmethod
     def _down(m: Module, k: int, accept, first, carry, plane, turns) -> tuple[Value, Value]:
@@ -271,13 +279,14 @@ class SpanAttributesUnit(wiring.Component):
         ]
 
 
-def _tag_shape() -> data.StructLayout:
+def _tag_shape(surface: AttributeSpans | None) -> data.StructLayout:
     return data.StructLayout(
         {
             "y": unsigned(PIXEL_BITS),
             "right": unsigned(1),
             "flip": unsigned(1),
             "material": unsigned(MATERIAL_BITS),
+            **placement_of(surface),
         }
     )
 

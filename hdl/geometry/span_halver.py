@@ -4,13 +4,20 @@ from amaranth.hdl import Cat, Module, Mux, Signal, Value, unsigned
 from amaranth.lib import data, stream, wiring
 from amaranth.lib.wiring import In, Out
 
+from blysk.golden.albedo.attribute_spans import AttributeSpans
 from blysk.golden.geometry.span_attributes import DEPTH_STEP, SPAN_DEPTH, SPAN_NORMAL, SPAN_STEP
 from blysk.golden.geometry.span_halver import SpanHalver
 from blysk.golden.geometry.triangles import ATTRIBUTES, MATERIAL_BITS, PIXEL_BITS
 from blysk.golden.number.fixed import SQ
 from blysk.hdl.core.fixed import FixedShape, FixedValue
-from blysk.hdl.core.views import copy_fields
 from blysk.hdl.geometry.span_attributes import whole_spans_shape
+from blysk.hdl.geometry.surface_words import (
+    STEP_BITS,
+    attribute_count,
+    halved_surface_shape,
+    placement_of,
+    surface_start,
+)
 from blysk.hdl.geometry.triangles import count_events, counters_shape
 
 __all__ = ["SpanHalverUnit", "halved_spans_shape", "is_apart", "is_kept", "shorter", "size_of"]
@@ -18,8 +25,11 @@ __all__ = ["SpanHalverUnit", "halved_spans_shape", "is_apart", "is_kept", "short
 _COMPONENTS = ATTRIBUTES - 1
 
 
-def halved_spans_shape() -> data.StructLayout:
-    """Shape of a piece: N/W at its first pixel, its step and shift, depth, first pixel, length, flags."""
+def halved_spans_shape(surface: AttributeSpans | None = None) -> data.StructLayout:
+    """Shape of a piece: N/W at its first pixel, its step and shift, depth, first pixel, length, flags.
+
+    With ``surface`` there are also words of its attributes, see `halved_surface_shape`.
+    """
     words = {
         "start": data.ArrayLayout(FixedShape(SPAN_NORMAL), _COMPONENTS),
         "step": data.ArrayLayout(FixedShape(SPAN_STEP), _COMPONENTS),
@@ -28,7 +38,7 @@ def halved_spans_shape() -> data.StructLayout:
     places = {name: unsigned(PIXEL_BITS) for name in ("x", "y", "length")}
     depth = {"depth": FixedShape(SPAN_DEPTH), "depth_step": FixedShape(DEPTH_STEP)}
     flags = {"flip": unsigned(1), "turned": unsigned(1), "material": unsigned(MATERIAL_BITS)}
-    return data.StructLayout(words | places | depth | flags)
+    return data.StructLayout(words | places | depth | flags | halved_surface_shape(surface))
 
 
 class SpanHalverUnit(wiring.Component):
@@ -43,12 +53,14 @@ class SpanHalverUnit(wiring.Component):
     ----------
     model : SpanHalver
         Bit-accurate model.
+    surface : AttributeSpans or None
+        Attributes of the surface that triangles bring.
 
     Members
     -------
-    i : :py:`In(stream.Signature(whole_spans_shape()))`
+    i : :py:`In(stream.Signature(whole_spans_shape(surface)))`
         Spans of `SpanAttributesUnit` with ``whole``.
-    o : :py:`Out(stream.Signature(halved_spans_shape()))`
+    o : :py:`Out(stream.Signature(halved_spans_shape(surface)))`
         Pieces of the spans: N/W at the first pixel, the attributes' step away from the long edge, and the
         number of places by which both are shifted.
     status : :py:`Out(counters_shape("cut"))`
@@ -64,12 +76,12 @@ class SpanHalverUnit(wiring.Component):
 
     latency = 1
 
-    def __init__(self, model: SpanHalver | None = None):
-        self.model = model or SpanHalver()
+    def __init__(self, model: SpanHalver | None = None, surface: AttributeSpans | None = None):
+        self.model, self._surface = model or SpanHalver(), surface
         super().__init__(
             {
-                "i": In(stream.Signature(whole_spans_shape())),
-                "o": Out(stream.Signature(halved_spans_shape())),
+                "i": In(stream.Signature(whole_spans_shape(surface))),
+                "o": Out(stream.Signature(halved_spans_shape(surface))),
                 "status": Out(counters_shape("cut")),
             }
         )
@@ -85,7 +97,7 @@ class SpanHalverUnit(wiring.Component):
         fits, takes, leaves = (Signal(name=name) for name in ("fits", "takes", "leaves"))
         tag = {
             name: Signal.like(Value.cast(given[name]), name=name, reset_less=True)
-            for name in ("y", "right", "flip", "material")
+            for name in ("y", "right", "flip", "material", *placement_of(self._surface))
         }
         x, left, pixels = (Signal(PIXEL_BITS, name=name, reset_less=True) for name in ("x", "left", "pixels"))
         m.d.comb += [
@@ -98,9 +110,8 @@ class SpanHalverUnit(wiring.Component):
         retries, rest = Signal(name="retries"), (left - pixels)[:PIXEL_BITS]
         odd = pixels[0]
         m.d.comb += retries.eq(valid & known & ~fits)
-        ends = [
-            self._attribute(m, k, (takes, leaves, retries), (fits, odd), given) for k in range(ATTRIBUTES)
-        ]
+        count, moves = attribute_count(self._surface), (takes, leaves, retries)
+        ends = [self._attribute(m, k, moves, (fits, odd), given) for k in range(count)]
         marks = self._marks(m, valid & ~known, takes, ends, given)
         m.d.comb += fits.eq(self._fits(marks, pixels))
 
@@ -127,7 +138,12 @@ class SpanHalverUnit(wiring.Component):
 
         turned = tag["right"]
         steps = []
-        for k, (near, far, step) in enumerate(ends):
+        for k, (near, far, step) in enumerate(ends[ATTRIBUTES:]):
+            m.d.comb += [
+                result.surface_start[k].eq(surface_start(Mux(turned, far, near))),
+                result.surface_step[k].eq(Mux(turned, -step, step)[:STEP_BITS]),
+            ]
+        for k, (near, far, step) in enumerate(ends[:ATTRIBUTES]):
             value = FixedValue(SPAN_STEP, Mux(turned, far, near).as_signed())
             if k < _COMPONENTS:
                 end = value.truncate(SPAN_NORMAL.fraction_bits).saturate(SPAN_NORMAL)
@@ -142,7 +158,7 @@ class SpanHalverUnit(wiring.Component):
             result.x.eq(Mux(turned, x + rest, x)),
             result.length.eq(pixels),
             result.turned.eq(turned),
-            *copy_fields(result, tag, ("y", "flip", "material")),
+            *(Value.cast(result[name]).eq(word) for name, word in tag.items() if name != "right"),
         ]
         count_events(m, self.status, cut=retries & uncut)
         return m

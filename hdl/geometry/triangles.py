@@ -3,6 +3,7 @@
 from amaranth.hdl import Module, Signal, Value, ValueLike, signed, unsigned
 from amaranth.lib import data
 
+from blysk.golden.albedo.attribute_spans import AttributeSpans
 from blysk.golden.geometry.edge_setup import X_BITS
 from blysk.golden.geometry.triangles import (
     ATTRIBUTE,
@@ -13,6 +14,7 @@ from blysk.golden.geometry.triangles import (
     Grid,
 )
 from blysk.hdl.core.fixed import FixedShape
+from blysk.hdl.geometry.surface_words import corner_surface_shape, placement_of
 
 __all__ = [
     "COUNTER_BITS",
@@ -29,22 +31,28 @@ COUNTER_BITS = 32
 """Bits of a counter, which counts modulo 2^32."""
 
 
-def corners_shape(grid: Grid = GRID) -> dict:
-    """Members of three corners: coordinates, depth, and N/W over the largest 1/W of the triangle."""
+def corners_shape(grid: Grid = GRID, surface: AttributeSpans | None = None) -> dict:
+    """Members of three corners: coordinates, depth, and N/W over the largest 1/W of the triangle.
+
+    With ``surface`` there are also its attributes, see `SurfaceWords`.
+    """
     coordinate, component = FixedShape(grid.coordinate), FixedShape(ATTRIBUTE)
     return {
         "x": data.ArrayLayout(coordinate, 3),
         "y": data.ArrayLayout(coordinate, 3),
         "depth": data.ArrayLayout(FixedShape(DEPTH), 3),
         "normal": data.ArrayLayout(data.ArrayLayout(component, 3), 3),
+        **corner_surface_shape(surface),
     }
 
 
-def triangle_shape(grid: Grid = GRID) -> data.StructLayout:
-    """Shape of a triangle: corners in any order, index of its material, whether the material is two-sided."""
-    return data.StructLayout(
-        corners_shape(grid) | {"material": unsigned(MATERIAL_BITS), "two_sided": unsigned(1)}
-    )
+def triangle_shape(grid: Grid = GRID, surface: AttributeSpans | None = None) -> data.StructLayout:
+    """Shape of a triangle: corners in any order, index of its material, whether the material is two-sided.
+
+    With texture coordinates there are also their base, range and level.
+    """
+    flags = {"material": unsigned(MATERIAL_BITS), "two_sided": unsigned(1)}
+    return data.StructLayout(corners_shape(grid, surface) | flags | placement_of(surface))
 
 
 def tag_shape() -> dict:

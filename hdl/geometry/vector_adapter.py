@@ -3,21 +3,29 @@
 from amaranth.hdl import Cat, Mux, Signal, Value, unsigned
 from amaranth.lib import data
 
+from blysk.golden.albedo.attribute_spans import AttributeSpans
 from blysk.golden.geometry.span_attributes import SPAN_NORMAL
 from blysk.golden.geometry.vector_adapter import VectorAdapter
+from blysk.hdl.albedo.attribute_spans import span_attributes_shape
 from blysk.hdl.core.fixed import FixedShape
 from blysk.hdl.core.pipelined_unit import PipelinedUnit
 from blysk.hdl.geometry.span_halver import halved_spans_shape
+from blysk.hdl.geometry.surface_words import placement_of, surface_exponent, surface_step, used_step
 
 __all__ = ["VectorAdapterUnit", "exponent_of", "rounded", "shift_of", "used_bits", "vector_spans_shape"]
 
 
-def vector_spans_shape(components: int = 3) -> data.StructLayout:
-    """Shape of a span: its first vector, step and exponent, first pixel, length, depth and material."""
-    vector = data.ArrayLayout(FixedShape(VectorAdapter.FORMAT), components)
+def vector_spans_shape(surface: AttributeSpans | None = None) -> data.StructLayout:
+    """Shape of a span: its first vector, step and exponent, first pixel, length, depth and material.
+
+    With ``surface`` there are also its ``attributes``, of `span_attributes_shape`.
+    """
+    vector = data.ArrayLayout(FixedShape(VectorAdapter.FORMAT), 3)
     exponent = unsigned(VectorAdapter.LARGEST_EXPONENT.bit_length())
     given = halved_spans_shape().members
     words = {name: given[name] for name in ("x", "y", "length", "depth", "depth_step", "material")}
+    if surface is not None:
+        words["attributes"] = span_attributes_shape(surface)
     return data.StructLayout({"start": vector, "step": vector, "exponent": exponent} | words)
 
 
@@ -31,20 +39,22 @@ class VectorAdapterUnit(PipelinedUnit):
     ----------
     model : VectorAdapter
         Bit-accurate model.
+    surface : AttributeSpans or None
+        Attributes of the surface that triangles bring.
 
     Members
     -------
-    i : :py:`In(stream.Signature(halved_spans_shape()))`
+    i : :py:`In(stream.Signature(halved_spans_shape(surface)))`
         Pieces of `SpanHalverUnit`.
-    o : :py:`Out(stream.Signature(vector_spans_shape()))`
-        The same pieces, with words of `SpanVectors`.
+    o : :py:`Out(stream.Signature(vector_spans_shape(surface)))`
+        The same pieces, with words of `SpanVectors`, and of `SurfaceWords`.
 
     Source: docs/theory/geometry.md#composition; not in the documents.
     """
 
-    def __init__(self, model: VectorAdapter | None = None):
-        self.model = model or VectorAdapter()
-        super().__init__(halved_spans_shape(), vector_spans_shape(), latency=4)
+    def __init__(self, model: VectorAdapter | None = None, surface: AttributeSpans | None = None):
+        self.model, self._surface = model or VectorAdapter(), surface
+        super().__init__(halved_spans_shape(surface), vector_spans_shape(surface), latency=4)
 
     def datapath(self, m, operands):
         """Shared shift; margin; the step's bits and shift; sign, rounding."""
@@ -52,7 +62,8 @@ class VectorAdapterUnit(PipelinedUnit):
         start, step = (
             [Value.cast(operands[name][k]).as_signed() for k in range(3)] for name in ("start", "step")
         )
-        names = [name for name in self.o.payload.shape().members if name not in ("start", "step", "exponent")]
+        made = "start", "step", "exponent", "attributes"
+        names = [name for name in self.o.payload.shape().members if name not in made]
         words = {name: Value.cast(operands[name]) for name in names}
         words |= {"flip": operands.flip, "step_flip": operands.flip ^ operands.turned}
         for age in range(1, self.latency):
@@ -89,7 +100,34 @@ class VectorAdapterUnit(PipelinedUnit):
             for k, code in enumerate(codes):
                 word = self.register(m, rounded(code, flip, point), f"{name}_{k}")
                 m.d.comb += Value.cast(result[name][k]).eq(word)
+        if self._surface is not None:
+            self._surface_words(m, operands, result.attributes)
         return result
+
+    def _surface_words(self, m, operands, result) -> None:
+        """Used bits of the surface's steps; their shift; registers up to the latency."""
+        starts, steps = operands.surface_start, operands.surface_step
+        words = {name: Value.cast(operands[name]) for name in placement_of(self._surface)}
+        words |= {f"surface_{k}": start for k, start in enumerate(starts)}
+        for age in range(1, self.latency + 1):
+            words = {name: self.register(m, word, f"{name}_{age}") for name, word in words.items()}
+        used = 0
+        for step in steps:
+            used = used | used_step(step)
+        used = self.register(m, used, "surface_used")
+        exponent = surface_exponent(used)
+        steps = [self.register(m, step, f"surface_step_{k}") for k, step in enumerate(steps)]
+        steps = [surface_step(step, exponent) for step in steps]
+        for age in range(2, self.latency + 1):
+            steps = [self.register(m, step, f"surface_step_{k}_{age}") for k, step in enumerate(steps)]
+            exponent = self.register(m, exponent, f"surface_exponent_{age}")
+        lines = [words.pop(f"surface_{k}") for k in range(len(starts))]
+        m.d.comb += [
+            Value.cast(result.start).eq(Cat(lines)),
+            Value.cast(result.step).eq(Cat(steps)),
+            result.exponent.eq(exponent),
+            *(Value.cast(result[name]).eq(word) for name, word in words.items()),
+        ]
 
 
 def rounded(code: Value, flip: Value, point: int) -> Value:

@@ -4,10 +4,12 @@ from amaranth.hdl import Cat, Const, Module, Mux, Signal, Value, signed, unsigne
 from amaranth.lib import data, stream, wiring
 from amaranth.lib.wiring import In, Out
 
+from blysk.golden.albedo.attribute_spans import AttributeSpans
 from blysk.golden.geometry.edge_setup import X_BITS
 from blysk.golden.geometry.triangles import GRID, Grid
 from blysk.golden.reference.scene import BACK_FACES
 from blysk.hdl.core.views import copy, copy_fields
+from blysk.hdl.geometry.surface_words import placement_of
 from blysk.hdl.geometry.triangles import (
     corners_shape,
     count_events,
@@ -27,9 +29,10 @@ DIGIT_BITS = 4
 """Bits of a height that go into the area on each cycle."""
 
 
-def sorted_triangle_shape(grid: Grid = GRID) -> data.StructLayout:
-    """Shape of `SortedTriangles.beats`: sorted corners, twice the area, and the tag."""
-    return data.StructLayout(corners_shape(grid) | {"area": unsigned(2 * grid.bits)} | tag_shape())
+def sorted_triangle_shape(grid: Grid = GRID, surface: AttributeSpans | None = None) -> data.StructLayout:
+    """Shape of `SortedTriangles.beats`: sorted corners, twice the area, the tag, place of the texture."""
+    area = {"area": unsigned(2 * grid.bits)}
+    return data.StructLayout(corners_shape(grid, surface) | area | tag_shape() | placement_of(surface))
 
 
 class VertexSortUnit(wiring.Component):
@@ -56,12 +59,14 @@ class VertexSortUnit(wiring.Component):
         Fraction bits of the coordinates.
     compact : bool
         Whether the unit has the compact style.
+    surface : AttributeSpans or None
+        Attributes of the surface that triangles bring.
 
     Members
     -------
-    i : :py:`In(stream.Signature(triangle_shape(grid)))`
+    i : :py:`In(stream.Signature(triangle_shape(grid, surface)))`
         Triangles.
-    o : :py:`Out(stream.Signature(sorted_triangle_shape(grid)))`
+    o : :py:`Out(stream.Signature(sorted_triangle_shape(grid, surface)))`
         Drawn triangles.
     constants : :py:`In(frame_shape())`
         The frame, constant while triangles are inside.
@@ -71,12 +76,12 @@ class VertexSortUnit(wiring.Component):
     Source: docs/theory/geometry.md#coverage; [T] figure 4.10.
     """
 
-    def __init__(self, grid: Grid = GRID, compact: bool = False):
-        self.grid, self.compact = grid, compact
+    def __init__(self, grid: Grid = GRID, compact: bool = False, surface: AttributeSpans | None = None):
+        self.grid, self.compact, self.surface = grid, compact, surface
         super().__init__(
             {
-                "i": In(stream.Signature(triangle_shape(grid))),
-                "o": Out(stream.Signature(sorted_triangle_shape(grid))),
+                "i": In(stream.Signature(triangle_shape(grid, surface))),
+                "o": Out(stream.Signature(sorted_triangle_shape(grid, surface))),
                 "constants": In(frame_shape()),
                 "status": Out(counters_shape("empty", "zero_area", "culled")),
             }
@@ -85,8 +90,12 @@ class VertexSortUnit(wiring.Component):
     def elaborate(self, platform):
         """The two stages and the counters."""
         m = Module()
-        corners = [Signal(_corner_shape(self.grid), name=f"corner_{k}") for k in range(3)]
+        corners = [Signal(_corner_shape(self.grid, self.surface), name=f"corner_{k}") for k in range(3)]
         material, odd = Signal.like(self.i.payload.material), Signal(name="odd")
+        places = {
+            name: Signal(shape, name=name, reset_less=True)
+            for name, shape in placement_of(self.surface).items()
+        }
         two_sided = Signal(name="two_sided")
         covered, leaves, digits = Signal(name="covered"), Signal(name="leaves"), Signal(3, name="digits")
         free, ends = Signal(name="area_free"), Signal(name="area_ends")
@@ -98,6 +107,7 @@ class VertexSortUnit(wiring.Component):
             material.eq(given.material),
             odd.eq(0),
             two_sided.eq(given.two_sided),
+            *(copy(place, given[name]) for name, place in places.items()),
         ]
         with m.Switch(step):
             with m.Case(0):
@@ -122,7 +132,7 @@ class VertexSortUnit(wiring.Component):
             with m.If(takes):
                 m.d.sync += enters
         self._box(m, corners, order, step, covered, digits)
-        zero, culled = self._area(m, corners, (material, two_sided), odd, digits, leaves, free, ends)
+        zero, culled = self._area(m, corners, (material, two_sided, places), odd, digits, leaves, free, ends)
         count_events(m, self.status, empty=(step == 4) & ~covered, zero_area=zero, culled=culled)
         return m
 
@@ -202,11 +212,13 @@ class VertexSortUnit(wiring.Component):
         """The second stage. Returns whether a triangle without area ends now, and whether a culled triangle
         ends now.
 
-        ``tag`` has the index of the material and whether the triangle is two-sided.
+        ``tag`` has the index of the material, whether the triangle is two-sided, and the place of its
+        texture.
         """
-        (material, is_two_sided), two_sided = tag, Signal(name="two_sided_area")
+        (material, is_two_sided, places), two_sided = tag, Signal(name="two_sided_area")
         grid, result = self.grid, self.o.payload
-        words = Signal(data.StructLayout(corners_shape(grid) | {"material": material.shape()}), name="sorted")
+        members = corners_shape(grid, self.surface) | {"material": material.shape()}
+        words = Signal(data.StructLayout(members | placement_of(self.surface)), name="sorted")
         total_bits, most = 2 * grid.bits + 1, _largest_digits(grid)
         total = Signal(signed(total_bits), name="total")
         left, busy, done, odd_area = Signal(3), Signal(name="busy"), Signal(name="done"), Signal()
@@ -243,6 +255,7 @@ class VertexSortUnit(wiring.Component):
         kept = [
             *(odd_area.eq(odd), two_sided.eq(is_two_sided), words.material.eq(material)),
             *self._sorted(words, corners),
+            *(copy(words[name], place) for name, place in places.items()),
         ]
         if self.compact:
             m.d.comb += kept
@@ -306,8 +319,9 @@ def _booth_digit(value: Value, bits: Value, negative: bool) -> tuple[Value, Valu
     return (size[:] ^ minus.replicate(len(size))).as_signed(), minus
 
 
-def _corner_shape(grid: Grid) -> data.StructLayout:
-    return data.StructLayout({name: shape.elem_shape for name, shape in corners_shape(grid).items()})
+def _corner_shape(grid: Grid, surface: AttributeSpans | None) -> data.StructLayout:
+    members = corners_shape(grid, surface).items()
+    return data.StructLayout({name: shape.elem_shape for name, shape in members})
 
 
 def _largest_digits(grid: Grid) -> int:

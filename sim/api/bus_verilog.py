@@ -27,12 +27,19 @@ _PATHS = {
 
 def triangle_descriptions(unit: RendererUnit | GeometryUnit) -> dict[str, str]:
     """Descriptions of the ports of a core that takes triangles."""
-    given = dict(RENDER_PORT_DESCRIPTIONS)
+    members = unit.i.payload.shape().members
+    given = {
+        port: text
+        for port, text in RENDER_PORT_DESCRIPTIONS.items()
+        if not port.startswith("i_") or port[2:] in members
+    }
     if frame := frame_text(unit):
         given["i_normal"] += f", {frame}"
     if isinstance(unit, RendererUnit):
         return given
     made = set(unit.o.payload.shape().members)
+    if unit.model.surface is not None:
+        made |= {f"attributes_{name}" for name in unit.o.payload.attributes.shape().members}
     words = {
         f"{member}_{name}"
         for member in ("constants", "status")

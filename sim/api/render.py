@@ -11,6 +11,7 @@ from typing import Any, Unpack, cast
 from blysk.golden.frame_constants import FrameConstants
 from blysk.golden.frames.prepare import constants_of
 from blysk.golden.frames.surface import design_for, with_albedo
+from blysk.golden.geometry.scene_triangles import check_texels
 from blysk.golden.lighting.intensity import MAX_LIGHTS
 from blysk.golden.pipeline import ShadingPipeline
 from blysk.golden.presets import METHODS, MIRROR_LOBES, PUBLISHED
@@ -153,8 +154,9 @@ def prepare_rendering(
         stage("loading the mesh")
         most = MAX_LIGHTS if design is None else design.lights
         local = design is None and _serves_local(settings)
-        albedo = settings["geometry"] == "software" if design is None else design.albedo is not None
-        loaded = load(settings, lights=most, local=local, albedo=albedo)
+        albedo = design is None or design.albedo is not None
+        software = settings["geometry"] == "software"
+        loaded = load(settings, lights=most, local=local, albedo=albedo, cutoffs=software)
         if loaded.lights and design is None:
             made = _built(settings, _design(settings))
         seconds = {"load": perf_counter() - start}
@@ -185,13 +187,24 @@ def prepare_rendering(
 
 def _fitted(design: ShadingPipeline, scene: Scene, settings: Settings) -> ShadingPipeline:
     """The design for the materials, colours of vertices and textures of a scene."""
-    if scene.has_albedo and settings["geometry"] == "hardware":
-        reason = "hardware geometry draws no vertex colours and no textures"
-        raise settings.refuse("geometry", reason, "use software")
-    if scene.cutoffs and settings["geometry"] == "hardware":
+    hardware = settings["geometry"] == "hardware"
+    if scene.has_albedo and hardware:
+        if not design.interpolator.geometry(design.lights).vectors:
+            reason = "hardware geometry gives vertex colours and textures to method quotient alone"
+            raise settings.refuse("method", reason, "use quotient, or geometry software", design.method)
+        if design.build.setups > 1:
+            reason = "vertex colours and textures take one lane of triangle setup"
+            raise settings.refuse("setups", reason, "leave out setups")
+        if scene.textures:
+            try:
+                check_texels(scene)
+            except ValueError as error:
+                reason, _, remedy = str(error).partition("; ")
+                raise settings.refuse("geometry", reason, f"{remedy}, or use software") from None
+    if scene.cutoffs and hardware:
         raise settings.refuse("geometry", "hardware geometry drops no pixels by alpha", "use software")
     try:
-        fitted = design_for(design, scene, settings["geometry"] == "software")
+        fitted = design_for(design, scene, not hardware, hardware)
     except ValueError as error:
         reason, _, remedy = str(error).partition("; ")
         raise InputError("textures", reason, remedy) from None

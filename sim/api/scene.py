@@ -4,7 +4,7 @@ import math
 import os
 import warnings
 from dataclasses import replace
-from typing import Unpack
+from typing import Any, Unpack
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -106,7 +106,12 @@ def warn_of_ignored(loaded: LoadedMesh) -> None:
 
 
 def load(
-    settings: Settings, *, lights: int = MAX_LIGHTS, local: bool = True, albedo: bool = True
+    settings: Settings,
+    *,
+    lights: int = MAX_LIGHTS,
+    local: bool = True,
+    albedo: bool = True,
+    cutoffs: bool = True,
 ) -> LoadedMesh:
     """The mesh of a scene, with its materials.
 
@@ -125,6 +130,8 @@ def load(
     albedo : bool
         Whether there may be vertex colours, textures and cutoffs of alpha. If not, the mesh lacks them, and
         ``ignored`` names them.
+    cutoffs : bool
+        The same for cutoffs of alpha alone.
 
     Raises
     ------
@@ -136,7 +143,7 @@ def load(
         return LoadedMesh(source.mesh, "scene", 0, 0)
     if isinstance(source, Mesh):
         loaded = LoadedMesh(source, "mesh", 0, 0, materials=(FileMaterial(colored=len(source.colors) > 0),))
-        return loaded if albedo else _without_albedo(loaded)
+        return _without(loaded, not albedo, not (albedo and cutoffs))
     if not isinstance(source, str | os.PathLike):
         return given_mesh(source, settings["crease"])
     with settings.mesh_located():
@@ -154,7 +161,7 @@ def load(
     if loaded.camera is not None and not _sees(loaded.camera, loaded.mesh, settings["size"]):
         reason = "a camera that does not see the mesh"
         loaded = replace(loaded, camera=None, ignored=(*loaded.ignored, reason))
-    return loaded if albedo else _without_albedo(loaded)
+    return _without(loaded, not albedo, not (albedo and cutoffs))
 
 
 def _sees(camera: Camera, mesh: Mesh, size: tuple[int, int]) -> bool:
@@ -169,23 +176,28 @@ def _sees(camera: Camera, mesh: Mesh, size: tuple[int, int]) -> bool:
     return not bool(beyond[:, mesh.faces].all(axis=2).any(axis=0).all())
 
 
-def _without_albedo(loaded: LoadedMesh) -> LoadedMesh:
-    """The mesh without vertex colours, textures and cutoffs of alpha; ``ignored`` names them."""
-    materials, mesh = loaded.materials, loaded.mesh
-    left_out = ["vertex colours"] if len(mesh.colors) else []
-    textures = len({id(material.texture) for material in materials if material.texture is not None})
-    left_out += [f"{textures} texture{'s' * (textures > 1)}"] if textures else []
-    cut = sum(material.cutoff is not None for material in materials)
-    left_out += [f"{cut} cutoff{'s' * (cut > 1)} of alpha"] if cut else []
-    if not any(material.has_albedo or material.cutoff is not None for material in materials):
+def _without(loaded: LoadedMesh, albedo: bool, cutoffs: bool) -> LoadedMesh:
+    """The mesh without vertex colours and textures, and without cutoffs of alpha; ``ignored`` names them.
+
+    ``albedo`` and ``cutoffs`` tell which of them the mesh loses.
+    """
+    materials, left_out = loaded.materials, []
+    mesh: dict[str, Any] = {}
+    plain: dict[str, Any] = {}
+    if albedo and any(material.has_albedo for material in materials):
+        left_out += ["vertex colours"] if len(loaded.mesh.colors) else []
+        textures = len({id(material.texture) for material in materials if material.texture is not None})
+        left_out += [f"{textures} texture{'s' * (textures > 1)}"] if textures else []
+        mesh |= {"colors": np.zeros((0, 3)), "coordinates": np.zeros((0, 2))}
+        plain |= {"texture": None, "colored": False}
+    if cutoffs and (cut := sum(material.cutoff is not None for material in materials)):
+        left_out.append(f"{cut} cutoff{'s' * (cut > 1)} of alpha")
+        mesh["alpha"] = np.zeros(0)
+        plain |= {"alpha": 1.0, "cutoff": None}
+    if not plain:
         return loaded
-    loaded = replace(
-        loaded,
-        mesh=replace(mesh, colors=np.zeros((0, 3)), coordinates=np.zeros((0, 2)), alpha=np.zeros(0)),
-        ignored=(*loaded.ignored, *left_out),
-    )
-    plain = [replace(material, texture=None, colored=False, alpha=1.0, cutoff=None) for material in materials]
-    return merged(loaded, dict(enumerate(plain)))
+    loaded = replace(loaded, mesh=replace(loaded.mesh, **mesh), ignored=(*loaded.ignored, *left_out))
+    return merged(loaded, dict(enumerate(replace(material, **plain) for material in materials)))
 
 
 def scenes_of(loaded: LoadedMesh, settings: Settings, count: int = 1) -> list[Scene]:

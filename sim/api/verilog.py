@@ -37,8 +37,16 @@ ShadingUnit = ShadingPipelineUnit | PixelPipelinesUnit | MergedPipelinesUnit
 """A unit from spans to pixels: one pipeline or several."""
 
 
-def header_of(unit: ShadingUnit) -> list[str]:
-    """Description of one or several pipelines, in lines: version, design, cycles, streams."""
+def header_of(unit: ShadingUnit, by_triangles: bool = False) -> list[str]:
+    """Description of one or several pipelines, in lines: version, design, cycles, streams.
+
+    Parameters
+    ----------
+    unit : ShadingUnit
+        The pipelines.
+    by_triangles : bool
+        Whether hardware geometry makes their spans, whose attributes are not described.
+    """
     model = unit.model
     several = model if isinstance(model, PixelPipelines) else None
     made = model.design if isinstance(model, PixelPipelines) else model
@@ -55,7 +63,7 @@ def header_of(unit: ShadingUnit) -> list[str]:
     ]
     if made.lights:
         lines += made.interpolator.input_lines(made.lights, made.specular is not None, made.factors)
-    lines += _albedo_lines(made)
+    lines += [] if by_triangles else _albedo_lines(made)
     lines += [
         f"colour constants: {Intensity.COLOR_FORMAT}, 255 times coefficient times light",
         "before the first span: hold rst high for a cycle, then write every frame constant in any order",
@@ -78,6 +86,21 @@ def _albedo_lines(design: ShadingPipeline) -> list[str]:
     ]
 
 
+def _surface_lines(geometry: GeometryUnit) -> list[str]:
+    """Description of the attributes of a triangle's surface, in lines."""
+    surface = geometry.model.surface
+    if surface is None:
+        return []
+    names = ["vertex colour r, g, b, 0 to 1"] * surface.colors
+    names += ["u, v, each (texels of the level - base) / 2^range, -1 to 1"] * surface.coordinates
+    return [
+        "The albedo of a pixel multiplies its ambient and diffuse light; emission is added.",
+        f"i_surface_*, {ATTRIBUTE}: of each corner {'; '.join(names)};",
+        "each times s, then s: 1/W over the largest 1/W of the triangle, times 1 - 2^-10; without",
+        "perspective s is 1 - 2^-10",
+    ]
+
+
 def _several_lines(several: PixelPipelines | None, unit: ShadingUnit) -> list[str]:
     """Description of several pipelines, in lines."""
     if several is None:
@@ -96,7 +119,7 @@ def _render_header(unit: RendererUnit) -> list[str]:
     """Description of a core from triangles to pixels: its pipeline without its input, and its geometry."""
     first, *lines = (
         line.replace("latency", "shading: latency") if line.startswith("latency") else line
-        for line in header_of(unit.pipeline)
+        for line in header_of(unit.pipeline, by_triangles=True)
         if not line.startswith("i_")
     )
     return [
@@ -148,6 +171,7 @@ def _geometry_lines(geometry: GeometryUnit) -> list[str]:
         "coordinates",
         f"i_normal_*: {normal} times 1/W over the largest 1/W of the triangle, "
         f"{ATTRIBUTE}; i_depth: linear on the screen",
+        *_surface_lines(geometry),
         f"constants_*: the picture's borders in pixels; back faces {', '.join(map(_numbered, BACK_FACES))}",
         f"constants_limit: {limit}",
         "constants_* change only while no triangle, span or pixel is inside; status_*: counters since reset",

@@ -103,6 +103,7 @@ def triangle_figures(
             "hidden_pixels": counts["hidden"],
             "dropped_pixels": counts["dropped"],
             "far_triangles": sent.far,
+            "several_levels": sent.several_levels,
             "missed_pieces": counts["missed_pieces"],
             "short_normals": counts["short_normals"],
             "out_of_range_spans": counts["out_of_range_spans"],

@@ -91,7 +91,7 @@ def attribute_beats(layout: data.StructLayout, attributes: SpanAttributes) -> np
     Parameters
     ----------
     layout : StructLayout
-        Layout of the beats, see `span_albedo_shape`. Further members stay 0.
+        Layout of the beats, see `span_attributes_shape`. Further members stay 0.
     attributes : SpanAttributes
         The attributes.
     """

@@ -22,6 +22,7 @@ _COUNTS = {
     "clipped_triangles": "triangles cut at the near plane or at the ends of the grid",
     "sliver_triangles": COUNTER_TEXTS["sliver"],
     "far_triangles": "triangles beyond 1,000 times the nearest W, where surfaces 0.1 % apart may swap",
+    "several_levels": "triangles that have a single level of a texture, and would need several",
     "hidden_spans": "spans without a pixel that shows, left out",
     "cut_out_pixels": "pixels dropped before the depth test, as their alpha is under the cutoff",
     "hidden_pixels": "pixels shaded behind earlier pixels",
@@ -37,6 +38,7 @@ _COUNTS = {
 _REMEDIES = {
     "opposed_faces": "--back-faces show takes their normals as they are; if they stay dark, export again",
     "far_triangles": "leave out the nearest triangles, or use geometry software",
+    "several_levels": "use geometry software, or divide the triangles",
     "missed_spans": "use quotient or renormalise",
     "missed_pieces": "use geometry software, or smaller triangles",
     "short_normals": "use geometry software, or divide the triangles",
@@ -47,7 +49,7 @@ _REMEDIES = {
 
 _WARNINGS = (
     *("opposed_faces", "repaired_normals", "dropped_faces", "missed_spans", "missed_pieces", "short_normals"),
-    *("out_of_range_spans", "far_triangles", "sharp_lobes"),
+    *("out_of_range_spans", "far_triangles", "several_levels", "sharp_lobes"),
 )
 """Counts that may show a fault of the mesh or the design."""
 

@@ -9,13 +9,16 @@ from amaranth.hdl import Module
 from amaranth.lib import wiring
 from amaranth.lib.wiring import Out
 
+from blysk.golden.albedo.attribute_spans import AttributeSpans
 from blysk.golden.frame_constants import writes_of
 from blysk.golden.frames.missed import missed_pieces
 from blysk.golden.frames.triangle_frame import frame_of_pixels, sent_triangles, triangle_constants
 from blysk.golden.geometry.light_adapter import LightAdapter
 from blysk.golden.geometry.scene_triangles import SceneTriangles
+from blysk.golden.geometry.surface_words import SurfaceWords
 from blysk.golden.geometry.triangles import ATTRIBUTE, DEPTH, FrameSettings, Triangles
 from blysk.golden.geometry.vertex_sort import VertexSort
+from blysk.golden.number.fixed import Fixed
 from blysk.golden.reference.scene import Scene
 from blysk.golden.render import Renderer
 from blysk.hdl.core.stream import connect
@@ -26,7 +29,13 @@ from blysk.sim.engines.engine import SimulationError
 from blysk.sim.engines.simulate import simulate
 from blysk.sim.frames.frame import sample_constants
 
-__all__ = ["LARGEST_PICTURE", "SimulatedTriangleFrame", "TriangleSimulator", "sample_triangles"]
+__all__ = [
+    "LARGEST_PICTURE",
+    "SimulatedTriangleFrame",
+    "TriangleSimulator",
+    "sample_triangles",
+    "with_surface",
+]
 
 LARGEST_PICTURE = 1 << 21
 """Pixels of the largest simulated memory of depths. Each takes 3 kB while the model is built."""
@@ -126,7 +135,7 @@ def sample_triangles(renderer: Renderer, size: tuple[int, int]) -> Triangles:
     # The largest pictures reach to the ends of the grid.
     corner = np.clip(corner, grid.coordinate.min_code, grid.coordinate.max_code)
     most = ATTRIBUTE.max_code
-    return Triangles(
+    triangles = Triangles(
         x=corner[..., 0],
         y=corner[..., 1],
         depth=rng.integers(0, DEPTH.max_code, (count, 3)),
@@ -135,6 +144,39 @@ def sample_triangles(renderer: Renderer, size: tuple[int, int]) -> Triangles:
         material=np.arange(count) * renderer.design.materials // count,
         two_sided=np.arange(count) % 2,
     )
+    return with_surface(triangles, renderer.geometry.surface, rng)
+
+
+def with_surface(triangles: Triangles, surface: AttributeSpans | None, rng: np.random.Generator) -> Triangles:
+    """Triangles with attributes of a surface: depths to 1:8, colours from 0 to 1, any texture coordinates.
+
+    Parameters
+    ----------
+    triangles : Triangles
+        The triangles.
+    surface : AttributeSpans or None
+        The attributes. ``None``: the triangles do not change.
+    rng : Generator
+        Of the random numbers.
+    """
+    if surface is None:
+        return triangles
+    count = len(triangles)
+    weight = 2.0 ** -rng.uniform(0, 3, (count, 3, 1))
+    weight *= SurfaceWords.LARGEST / weight.max(axis=1, keepdims=True)
+    low = np.repeat([0, -1], [3 * surface.colors, 2 * surface.coordinates])
+    attributes = rng.uniform(low, 1, (count, 3, surface.attributes))
+    attributes[::4] = np.rint(attributes[::4])
+    words = np.concatenate((attributes * weight, weight), axis=2)
+    places = {}
+    if surface.coordinates:
+        for name, format, *shape in (
+            ("base", surface.BASE_FORMAT, 2),
+            ("range", surface.RANGE_FORMAT),
+            ("level", surface.LEVEL_FORMAT),
+        ):
+            places[name] = rng.integers(format.min_code, format.max_code + 1, (count, *shape))
+    return replace(triangles, surface=Fixed.round(ATTRIBUTE, words).codes, **places)
 
 
 class TriangleSimulator:
@@ -294,7 +336,7 @@ class TriangleSimulator:
             sides.append(np.maximum(np.minimum(high, end) - np.maximum(low, first), 0) + 2)
         width, height = sides
         pixels = np.minimum(width * height, drawn.area / (2 * steps**2) + width + height + 1)
-        cycles = geometry.interval + np.ptp(triangles.y, axis=1) / steps
+        cycles = geometry.interval + geometry.row_cycles * np.ptp(triangles.y, axis=1) / steps
         cycles += (self._render.pipeline.cycles_per_pixel + 1) * pixels
         total = np.append(np.cumsum(cycles), np.full(inside, cycles.sum()))
         return _PAUSE + int((total[inside:] - total[:-inside]).max(initial=total[inside - 1]))

@@ -11,14 +11,19 @@ from amaranth.back import rtlil
 from blysk.bench.units.pipeline import RECORD, case_of
 from blysk.bench.units.pipeline_spans import any_constants, any_spans
 from blysk.bench.units.record import UnitRun
+from blysk.golden.albedo.albedo import Albedo
+from blysk.golden.albedo.attribute_spans import AttributeSpans
 from blysk.golden.albedo.texel_memory import TexelMemory
 from blysk.golden.albedo.texture_sampler import TextureSampler
 from blysk.golden.build import BuildError
+from blysk.golden.geometry.geometry import Geometry
+from blysk.golden.geometry.triangles import FrameSettings
 from blysk.golden.presets import preset
 from blysk.golden.render import Renderer
 from blysk.hdl.pipeline import ShadingPipelineUnit
 from blysk.sim.engines.simulate import simulate
 from blysk.sim.frames.outside_texels import PipelineWithTexels
+from blysk.sim.frames.triangles import sample_triangles
 
 from ..checks import assert_equals_model
 
@@ -56,8 +61,23 @@ def test_texels_outside_are_refused_where_they_have_no_port():
     for option, value in (("pipes", 2), ("bus", "axi")):
         with pytest.raises(BuildError, match=rf"^{option}: only a single native core has texels out"):
             outside.built(**{option: value})
-    with pytest.raises(ValueError, match=r"^hardware geometry has no vertex colours and no textures; leave"):
-        Renderer(design)
+    with pytest.raises(ValueError, match=r"^hardware geometry needs its texels inside; take a memory"):
+        Renderer(outside)
+
+
+def test_an_albedo_of_triangles_is_refused_where_geometry_does_not_serve_it():
+    design = replace(preset("quotient"), albedo=Albedo())
+    assert Renderer(design).geometry.surface == AttributeSpans()
+    with pytest.raises(ValueError, match=r"^hardware geometry has no .* for method renormalise; use quot"):
+        Renderer(replace(preset("renormalise"), albedo=Albedo()))
+    with pytest.raises(ValueError, match=r"^hardware geometry gives 1/W of every pixel; take an albedo with"):
+        Renderer(replace(design, albedo=Albedo(perspective=False)))
+    with pytest.raises(ValueError, match=r"^vertex colours and textures take one lane .*; take setups 1"):
+        Renderer(design.built(top="render", setups=2))
+    with pytest.raises(ValueError, match=r"^the geometry gives other attributes of the surface than"):
+        Renderer(design, Geometry(vectors=True))
+    with pytest.raises(ValueError, match=r"^the triangles have other attributes than the geometry"):
+        Renderer(design).geometry.compute(sample_triangles(Renderer(), (8, 8)), FrameSettings.centred(8, 8))
 
 
 def test_a_pipeline_without_albedo_has_nothing_of_it():

@@ -7,10 +7,12 @@ import numpy as np
 
 from blysk.bench.units.record import Case, Record, Stimulus, Variant, once
 from blysk.bench.units.triangles import ended, frame_of, random_triangles, small_frame
+from blysk.golden.albedo.attribute_spans import AttributeSpans
 from blysk.golden.build import Build
 from blysk.golden.geometry.geometry import Geometry
 from blysk.golden.geometry.triangles import FrameSettings, Grid, Triangles
 from blysk.hdl.geometry.geometry import GeometryUnit
+from blysk.sim.frames.triangles import with_surface
 
 __all__ = ["RECORD"]
 
@@ -20,17 +22,23 @@ def _spans(unit, case):
     return unit.model.compute(Triangles(**case.beats), frame_of(case.constants))
 
 
+def _ended(unit, rng, triangles):
+    return with_surface(ended(triangles, unit.grid), unit.model.surface, rng)
+
+
+def _random(unit, rng, count, size, spread):
+    return _ended(unit, rng, random_triangles(rng, count, unit.grid, size, spread))
+
+
 def _small(unit, rng, count):
     """Triangles of all kinds in a small picture. Its borders cut them on every side."""
-    return Case(
-        ended(random_triangles(rng, count, unit.grid, 6.0, 0.3), unit.grid).beats, small_frame(rng).codes
-    )
+    return Case(_random(unit, rng, count, 6.0, 0.3).beats, small_frame(rng).codes)
 
 
 def _tiny(unit, rng, count):
     """Triangles of about one pixel. Back faces are dropped."""
     frame = FrameSettings(-20, -20, 20, 20, "cull", 200)
-    return Case(ended(random_triangles(rng, count, unit.grid, 1.0, 0.1), unit.grid).beats, frame.codes)
+    return Case(_random(unit, rng, count, 1.0, 0.1).beats, frame.codes)
 
 
 def _mesh(unit, rng, count):
@@ -51,13 +59,13 @@ def _mesh(unit, rng, count):
     triangles = replace(
         random_triangles(rng, count, unit.grid, 1.0, 0.1), x=points[..., 0].copy(), y=points[..., 1].copy()
     )
-    return Case(ended(triangles, unit.grid).beats, FrameSettings(-24, -24, 24, 24, "flip", 200).codes)
+    return Case(_ended(unit, rng, triangles).beats, FrameSettings(-24, -24, 24, 24, "flip", 200).codes)
 
 
 def _drawn(unit, rng, count):
     """Small triangles. Few are dropped, so triangles come faster than the setup takes them."""
     frame = FrameSettings(-60, -60, 60, 60, "flip", 200)
-    return Case(ended(random_triangles(rng, count, unit.grid, 3.0, 0.1), unit.grid).beats, frame.codes)
+    return Case(_random(unit, rng, count, 3.0, 0.1).beats, frame.codes)
 
 
 def _dense(unit, rng, count):
@@ -68,13 +76,13 @@ def _dense(unit, rng, count):
     step = unit.grid.steps
     for place, far in ((triangles.x, [0, 1, 0]), (triangles.y, [0, 0, 1])):
         place[:] = rng.integers(-40, 40, (count, 1)) * step + np.array(far) * 5 * step // 4
-    return Case(triangles.beats, frame.codes)
+    return Case(with_surface(triangles, unit.model.surface, rng).beats, frame.codes)
 
 
 def _large(unit, rng, count):
     """Triangles as large as the picture, with spans in several pieces."""
     frame = FrameSettings(-100, -80, 100, 80, "flip", 60)
-    return Case(ended(random_triangles(rng, count, unit.grid, 80.0, 0.05), unit.grid).beats, frame.codes)
+    return Case(_random(unit, rng, count, 80.0, 0.05).beats, frame.codes)
 
 
 def _largest(unit, rng, count):
@@ -84,12 +92,14 @@ def _largest(unit, rng, count):
     low, high = unit.grid.coordinate.min_code, unit.grid.coordinate.max_code
     inwards = rng.integers(0, 100, (len(triangles.y[1::4]), 3)) * [1, 1, -1]
     triangles.y[1::4] = np.array([low, low + 99, high]) + inwards
-    return Case(ended(triangles, unit.grid).beats, small_frame(rng).codes)
+    return Case(_ended(unit, rng, triangles).beats, small_frame(rng).codes)
 
 
 def _unit(model=None, **build):
     return partial(GeometryUnit, model, Build(top="geometry", **build))
 
+
+_BOTH = AttributeSpans(coordinates=True)
 
 RECORD = Record(
     name="geometry",
@@ -104,6 +114,11 @@ RECORD = Record(
         "true lines": Variant(_unit(Geometry(lines=True)), long=True),
         "vectors": Variant(_unit(Geometry(vectors=True)), long=True),
         "two lanes": Variant(_unit(setups=2), long=True),
+        "vectors, colours": Variant(_unit(Geometry(vectors=True, surface=AttributeSpans())), long=True),
+        "vectors, colours, textures": Variant(_unit(Geometry(vectors=True, surface=_BOTH)), long=True),
+        "compact, vectors, colours, textures": Variant(
+            _unit(Geometry(vectors=True, surface=_BOTH), style="compact"), long=True
+        ),
         "4 fraction bits": Variant(_unit(Geometry(Grid(4))), long=True),
     },
     expect=lambda unit, case: _spans(unit, case)[0].beats,

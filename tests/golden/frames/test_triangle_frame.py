@@ -5,14 +5,16 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from blysk.golden.frames.compare import compare_image
+from blysk.golden.frames.compare import compare_image, compare_triangles
 from blysk.golden.frames.prepare import constants_of
+from blysk.golden.frames.surface import design_for
 from blysk.golden.frames.triangle_frame import sent_triangles, triangle_frame
 from blysk.golden.geometry.geometry import Geometry
 from blysk.golden.presets import preset
 from blysk.golden.reference.raster import rasterise
 from blysk.golden.reference.reflection import REFLECTION_MODELS
 from blysk.golden.reference.renderer import render
+from blysk.golden.reference.texture import Texture
 from blysk.golden.render import Renderer
 from blysk.sim.api.scene import scene
 
@@ -190,3 +192,24 @@ def test_methods_and_geometry_must_fit():
         Renderer(preset("quadratic", "cosquad"), Geometry(lines=True))
     with pytest.raises(ValueError, match="takes true lines, the geometry gives unit normals"):
         Renderer(preset("renormalise", "cosquad"), Geometry())
+
+
+@pytest.mark.parametrize("projection", ["perspective", "orthographic"])
+@pytest.mark.parametrize("texture", [None, "bilinear", "nearest"])
+def test_colours_and_textures_within_their_bound(projection, texture):
+    """Every pixel of a teapot whose colours are its places; with a texture of noise, in its levels."""
+    drawn = scene("teapot", size=(80, 60), triangles=1000, projection=projection)
+    place = (drawn.mesh.vertices - drawn.mesh.vertices.min(axis=0)) / np.ptp(drawn.mesh.vertices, axis=0)
+    mesh = replace(drawn.mesh, colors=place, coordinates=3 * place[:, :2] - 1)
+    material = drawn.materials[0]
+    if texture:
+        noise = np.random.default_rng(3).random((64, 64, 3))
+        material = replace(material, texture=Texture(noise, filter=texture, wrap=("clamp", "mirror")))
+    drawn = replace(drawn, mesh=mesh, material=material)
+    renderer = Renderer(design_for(preset("quotient", "blinn"), drawn, triangles=True))
+    frame = triangle_frame(drawn, renderer)
+    compared = compare_triangles(drawn, renderer, frame.sent, frame.image)
+    assert 0.49 < compared.method_error.steady_lsb < compared.bound_lsb < 0.8
+    assert (len(np.unique(frame.sent.levels)) > 2) == bool(texture)
+    plain = triangle_frame(scene("teapot", size=(80, 60), triangles=1000, projection=projection), Renderer())
+    np.testing.assert_array_equal(frame.owner, plain.owner)

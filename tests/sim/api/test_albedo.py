@@ -77,10 +77,6 @@ def test_without_an_albedo_colours_are_told(tmp_path):
     (made,) = scenes_of(loaded, settings)
     assert (made.has_albedo, made.materials[0].texture) == (False, None)
     path.write_text(SQUARE.replace(" 1 0 0\n", "\n") + "f 1 2 3 4\n")
-    hardware = {"geometry": "hardware", "size": (16, 12)}
-    ready = prepared(path, None, "pysim", hardware)
-    assert ready.design.albedo is None
-    assert ready.loaded.ignored[-1] == "vertex colours"
     ready = prepared(path, blysk.design(), "pysim", {"size": (16, 12)})
     assert ready.loaded.ignored[-1] == "vertex colours"
 
@@ -153,7 +149,8 @@ def test_hardware_geometry_has_no_holes(tmp_path):
     options = {"size": (16, 12), "geometry": "hardware"}
     path = holed(tmp_path)
     ready = prepared(path, None, "pysim", options)
-    assert ready.loaded.ignored == ("1 texture", "1 cutoff of alpha")
+    assert ready.loaded.ignored == ("1 cutoff of alpha",)
+    assert ready.scenes[0].textures
     assert not ready.scenes[0].cutoffs
     scene = blysk.scene(path)
     plain = tuple(dataclasses.replace(of, texture=None) for of in scene.materials)
@@ -171,8 +168,6 @@ def test_what_an_albedo_cannot_take_is_refused(tmp_path, monkeypatch):
     lights = ["0,0,1,7,7,7"] * 3
     with pytest.raises(OptionError, match=r"lights: .* 16"):
         prepared(path, None, "pysim", {"lights": lights})
-    with pytest.raises(OptionError, match="geometry hardware: hardware geometry draws no vertex colours"):
-        prepared(blysk.scene(path), None, "pysim", {"geometry": "hardware"})
     monkeypatch.setattr(TexelMemory, "LARGEST", 2048)
     with pytest.raises(
         InputError, match=r"^textures: a texture of 128x128 texels needs .*; take smaller images"

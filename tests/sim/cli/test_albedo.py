@@ -11,6 +11,7 @@ from blysk.sim.cli.main import main
 pytestmark = pytest.mark.usefixtures("folder")
 
 SMALL = "--method", "linear", "--model", "cosquad"
+TRIANGLES = "--geometry", "hardware", "--albedo", "colors"
 
 
 def test_verilog():
@@ -32,6 +33,14 @@ def test_verilog():
         (["--albedo", "colors", "--testbench", "bench"], "--testbench", "leave out --albedo"),
         (["--albedo", "nearest,outside", "--pipes", "2"], "--pipes 2", "a single native core"),
         (["--albedo", "nearest,outside", "--bus", "axi"], "--bus axi", "a single native core"),
+        (
+            [*TRIANGLES, "--method", "renormalise"],
+            "--geometry hardware",
+            "use quotient, or spans from software",
+        ),
+        ([*TRIANGLES, "--setups", "2"], "--geometry hardware", "take setups 1, or spans from software"),
+        ([*TRIANGLES[:-1], "colors,orthographic"], "--geometry hardware", "take an albedo with perspective"),
+        ([*TRIANGLES[:-1], "nearest,outside"], "--geometry hardware", "take a memory that is not external"),
     ],
 )
 def test_refused(refused, options, thing, says):

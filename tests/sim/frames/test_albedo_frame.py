@@ -12,6 +12,7 @@ from blysk.golden.albedo.texture_sampler import TextureSampler
 from blysk.golden.frames.frame import frame_buffer, model_frame
 from blysk.golden.frames.prepare import prepare
 from blysk.golden.frames.surface import design_for
+from blysk.golden.frames.triangle_frame import triangle_frame
 from blysk.golden.reference.camera import Camera
 from blysk.golden.reference.geometry import Mesh, normalise
 from blysk.golden.reference.light import Light
@@ -19,6 +20,7 @@ from blysk.golden.reference.lighting import Material
 from blysk.golden.reference.renderer import render
 from blysk.golden.reference.scene import Scene
 from blysk.golden.reference.texture import Texture
+from blysk.golden.render import Renderer
 from blysk.sim.errors import OptionError
 
 GLOSSY = Material((0.1,) * 3, (0.6,) * 3, (0.3,) * 3, 50)
@@ -92,6 +94,37 @@ def test_render_of_a_mesh_with_colours():
     assert len(np.unique(frame.image)) > 30
 
 
-def test_hardware_geometry_refuses_colours():
-    with pytest.raises(OptionError, match="hardware geometry draws no vertex colours and no textures"):
-        blysk.render(scene_of((40, 30)), geometry="hardware", engine="pysim")
+@pytest.mark.long
+@pytest.mark.parametrize(
+    ("projection", "style"), [("perspective", "throughput"), ("orthographic", "compact")]
+)
+def test_colours_times_texels_by_triangles(projection, style):
+    """The pixels of the model, and half an LSB from float64, by hardware geometry."""
+    scene = scene_of((24, 18))
+    scene = replace(scene, camera=replace(scene.camera, projection=projection))
+    options = {"geometry": "hardware", "transfer": "linear", "style": style}
+    frame = blysk.render(scene, engine="pysim", **options)
+    np.testing.assert_array_equal(frame.image, triangle_frame(scene, Renderer(frame.design)).image)
+    assert 0.4 < frame.error.steady_lsb < frame.comparison.bound_lsb < 1
+
+
+@pytest.mark.parametrize(
+    ("options", "match"),
+    [
+        (
+            {"method": "renormalise"},
+            "method renormalise: hardware geometry gives vertex colours .*; use quotient",
+        ),
+        ({"setups": 2}, "setups 2: vertex colours and textures take one lane .*; leave out setups"),
+    ],
+)
+def test_hardware_geometry_refuses_colours_that_it_does_not_serve(options, match):
+    with pytest.raises(OptionError, match=match):
+        blysk.render(scene_of((40, 30)), geometry="hardware", engine="pysim", **options)
+
+
+def test_triangles_that_cross_too_many_texels_are_refused():
+    scene = scene_of((40, 30))
+    scene = replace(scene, mesh=replace(scene.mesh, coordinates=scene.mesh.coordinates * 600))
+    with pytest.raises(OptionError, match=r"geometry hardware: a triangle crosses more than 4094 texels; di"):
+        blysk.render(scene, geometry="hardware", engine="pysim")
