@@ -1,4 +1,4 @@
-"""The Utah teapot through simulated hardware, and the hardware as Verilog: python render.py FOLDER."""
+"""Draw the Utah teapot by simulated hardware, and write this hardware as Verilog: python render.py FOLDER."""
 
 import sys
 from pathlib import Path

@@ -38,7 +38,7 @@ KINDS = {
     "slip": "a slip in print, drawing or listing",
     "figure": "a figure that the printed digits do not give",
     "unclear": "a statement that is undefined, or has two meanings",
-    "reading": "perhaps no error of the authors, but marks lost when a machine read our copy of the text",
+    "reading": "perhaps no error of the authors: a machine read our copy, and marks may be lost",
     "form": "no error: a form or choice that is good in its range, and that our units replace",
 }
 """Explanations of the kinds of entries."""
@@ -471,8 +471,8 @@ _DOCUMENT = Document(
     "Errata of the documents",
     [
         f"This section has {sum(matters().values())} matters in {len(CLAIMS)} entries. Each entry has a "
-        "quantity that anyone can compute again: by the printed statement, and by the right or replaced "
-        f"statement. Not every entry is an error: {matters()['form']} matters are forms that are good in "
+        "quantity that anyone can compute again: by the printed statement, and by our correction or form. "
+        f"Not every entry is an error: {matters()['form']} matters are forms that are good in "
         "their range. The units keep the published constants as named variants. The other sections show "
         "the effect of these constants.",
     ],

@@ -1,4 +1,4 @@
-// Runs triangle.v until it is done, and writes the picture, a pixel a line: rrggbb.
+// Runs triangle.v until it is done, and writes the picture. Each line has a pixel: rrggbb.
 module bench;
   reg clk = 0, rst = 1;
   wire done;

@@ -1,4 +1,4 @@
-"""One triangle, drawn into a memory: the design of triangle.v in Amaranth, simulated.
+"""Draw a triangle into a memory: the design of triangle.v, in Amaranth and simulated.
 
 python triangle.py triangle.png
 """
@@ -19,13 +19,13 @@ from blysk.golden.render import Renderer
 from blysk.hdl.render import RendererUnit
 
 WIDTH, HEIGHT = 32, 24
-# Spans of at most 10 degrees: the core's header has that for exponent 50.
+# Spans of at most 10 degrees. The header of the core names this limit for exponent 50.
 FRAME = FrameSettings.centred(WIDTH, HEIGHT, limit=FrameSettings.limit_of(10)).codes
 # Ambient 0.05, diffuse 0.4, specular 0.55, exponent 50, white light along the viewer.
 WRITES = {0: 50, 1: 816, 2: 816, 3: 816} | dict(
     enumerate([0, 0, 131071, 0, 0, 131071, 6528, 6528, 6528, 8976, 8976, 8976], 16)
 )
-# Corners in 1/256 pixel about the middle of the picture; normals times 2^23.
+# Corners are in 1/256 pixel, counted from the middle of the picture; normals are times 2^23.
 TRIANGLE = {
     "x": [-3584, -1024, 3328],
     "y": [-2560, 2816, -512],
@@ -46,7 +46,7 @@ class Triangle(wiring.Component):
         super().__init__()
 
     def elaborate(self, platform):
-        """The core, writes from a table, the triangle, and the memory; the depths are in the core."""
+        """Connect the core, a table of writes, the triangle and the memory. The core holds the depths."""
         m = Module()
         renderer = Renderer(blysk.design(model="cosquad"))
         m.submodules.core = core = RendererUnit(renderer, size=(WIDTH, HEIGHT))
@@ -85,7 +85,7 @@ class Triangle(wiring.Component):
 
 
 def picture() -> np.ndarray:
-    """The picture, uint8 of shape (24, 32, 3), of Amaranth's simulator."""
+    """The picture that Amaranth's simulator draws, uint8 of shape (24, 32, 3)."""
     top, words = Triangle(), []
     simulator = Simulator(top)
     simulator.add_clock(1e-8)

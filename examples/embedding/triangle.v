@@ -1,10 +1,10 @@
-// One triangle, drawn into a memory of 32 x 24 pixels. The core, which tells its ports and codes in its header:
+// Draws a triangle into a memory of 32 x 24 pixels. The header of the core describes its ports and codes. Make the core by
 //   blysk verilog --top render --model cosquad -o core.v
 module triangle (input clk, input rst, output done);
   reg [23:0] picture [0:1023], depths [0:1023], depth;
-  reg [4:0] n;   // frame constants written; then the triangle
+  reg [4:0] n;   // number of frame constants written, 0 to 16; 17 after the triangle
   integer k;
-  initial for (k = 0; k < 1024; k = k + 1) picture[k] = 24'h1a1c20;   // the core clears the depths
+  initial for (k = 0; k < 1024; k = k + 1) picture[k] = 24'h1a1c20;   // the core clears the memory of depths
 
   // Ambient 0.05, diffuse 0.4, specular 0.55, exponent 50, white light along the viewer.
   wire [8:0] address = n < 4 ? n : n + 12;
@@ -18,7 +18,7 @@ module triangle (input clk, input rst, output done);
   wire [7:0] r, g, b;
   wire [23:0] o_depth, new_depth;
   wire write;
-  reg [10:0] quiet;   // clocks since the last pixel: of one triangle none comes later than these
+  reg [10:0] quiet;   // clocks since the last pixel; after 2047 clocks no pixel of the triangle comes any more
   assign done = &quiet;
   always @(posedge clk) begin
     if (o_valid) picture[{y[4:0], x[4:0]}] <= {r, g, b};
@@ -27,8 +27,8 @@ module triangle (input clk, input rst, output done);
     quiet <= rst || o_valid || n < 17 ? 0 : done ? quiet : quiet + 1;
   end
 
-  // Corners in 1/256 pixel about the middle of the picture; normals times 2^23. Limit: 2048 sin(10 degrees / 2), as
-  // the core's header has 10 degrees for exponent 50.
+  // Corners are in 1/256 pixel, counted from the middle of the picture; normals are times 2^23. The limit is
+  // 2048 sin(10 degrees / 2): the core's header names 10 degrees for exponent 50.
   blysk core (.clk(clk), .rst(rst),
     .write_address(address), .write_data(data), .write_valid(n < 16), .write_ready(write_ready),
     .i_valid(n == 16), .i_ready(i_ready), .i_material(10'd0), .i_two_sided(1'd0),

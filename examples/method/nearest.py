@@ -1,4 +1,4 @@
-"""The method ``nearest``: each pixel has the normal of the nearer end of its span."""
+"""The method ``nearest``: each pixel takes the normal of the nearer end of its span."""
 
 from dataclasses import dataclass
 
@@ -20,7 +20,7 @@ __all__ = ["METHODS", "RECORD", "NearestInterpolator", "NearestInterpolatorUnit"
 
 @dataclass(frozen=True)
 class NearestInterpolator(NormalInterpolator):
-    """The normal of the nearer end; spans are cut until their ends are at most 2 degrees apart.
+    """Each pixel takes the normal of the nearer end. Spans are cut to at most 2 degrees.
 
     Parameters
     ----------
@@ -35,7 +35,7 @@ class NearestInterpolator(NormalInterpolator):
 
     @property
     def normal_error(self):
-        """0: the normals are those of the ends."""
+        """0, because the normals are those of the ends."""
         return 0.0
 
     @property
@@ -44,30 +44,30 @@ class NearestInterpolator(NormalInterpolator):
         return False
 
     def widest_span(self, exponent):
-        """2 degrees, so that no normal is off by more than 1."""
+        """2 degrees, so that no normal is off by more than 1 degree."""
         return 2.0
 
     def cut(self, cutter):
-        """Spans cut by their angle alone."""
+        """Spans after cuts by their angle alone."""
         return cutter.by_angle()
 
     def missed(self, cutter, cut):
-        """Spans whose angle alone does not keep the tolerance."""
+        """Number of spans after `cut` whose curve is off by more than a quarter of an LSB."""
         return cutter.missed(cut)
 
     def operand_error(self, length, degrees):
-        """0: the products are exact."""
+        """0, because the products are exact."""
         return 0.0
 
     def normals(self, normal_left, normal_right, length):
-        """Bit-accurate normals: of m pixels, the first (m + 1) // 2 have the left one."""
+        """Bit-accurate normals: of m pixels, the first (m + 1) // 2 have the left normal."""
         span, step = pixels_of(length)
         first = (step < (np.asarray(length) + 1)[span] // 2)[:, np.newaxis]
         codes = np.where(first, normal_left.codes[span], normal_right.codes[span])
         return Fixed(normal_left.format, codes), np.zeros(len(length), dtype=bool)
 
     def exact_normals(self, normal_left, normal_right, t):
-        """The same in float64."""
+        """The same rule in float64."""
         return np.where(np.asarray(t)[..., np.newaxis] <= 1 / 2, normal_left, normal_right)
 
 
@@ -94,7 +94,7 @@ class NearestInterpolatorUnit(NormalInterpolatorUnit, model=NearestInterpolator)
         self.latency = 1 + self.product_latency
 
     def source(self, m):
-        """The normals, and ``out_of_range``, which never is."""
+        """The normals, and ``out_of_range``, which is always 0."""
         span, advance = self.i.payload, Signal()
         active, ends = count_down(m, self.i.valid, span.length, advance)
         left, right = (Signal(normal_shape(), name=name) for name in ("left", "right"))

@@ -11,7 +11,8 @@ from blysk.bench.report.cosine_quadratic import PUBLISHED, errors
 from blysk.bench.report.counted import DEAR
 from blysk.bench.report.errata import CLAIMS as ERRATA
 from blysk.bench.report.errata import KINDS, factor_quadratics, matters
-from blysk.bench.report.thesis import SPEEDS, counted
+from blysk.bench.report.thesis import SPEEDS
+from blysk.bench.report.thesis_software import counted
 from blysk.golden.number.polynomials import half_angle_factor, largest_error, minimax
 from blysk.golden.reference.reflection import exponent_ratio
 
