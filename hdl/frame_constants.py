@@ -73,7 +73,7 @@ def frame_constants_shape(
 
 
 class FrameConstantsUnit(wiring.Component):
-    """Registers for the constants of a frame. A write changes one word.
+    """Registers of the frame constants. A write changes one word.
 
     A write is accepted on a cycle on which ``hold`` is low. Words have 18 bits. A shorter constant takes the
     low bits of its word. A write to an address without a constant is accepted, and changes nothing. Reset
@@ -102,9 +102,9 @@ class FrameConstantsUnit(wiring.Component):
     A constant has its value 2 cycles after its write was accepted. With several materials the exponent and
     the colours are in memories, one for each word. They are written for the material whose index was last
     written to address 4. They are read for ``material``: 1 cycle after ``material`` changes, and 3 cycles
-    after a write. All 18 bits of an index count. Writes for an index past the last material are lost. So is a
-    bank past the last bank. A unit of one material has no index, and address 4 changes nothing. Reset does
-    not clear memories.
+    after a write. All 18 bits of an index count. Writes for an index past the last material are lost. A write
+    of a bank past the last bank is lost, too. A unit of one material has no index, and address 4 changes
+    nothing. Reset does not clear memories.
 
     Parameters
     ----------
@@ -165,7 +165,7 @@ class FrameConstantsUnit(wiring.Component):
         super().__init__(members)
 
     def elaborate(self, platform):
-        """A register or memory for each word, and registers for the data and the half decoded address."""
+        """A register or memory for each word, and registers for the data and the partly decoded address."""
         m = Module()
         m.d.comb += self.write.ready.eq(~self.hold)
         words, of_material = {}, set()

@@ -16,7 +16,7 @@ from blysk.hdl.video.draw_unit import DrawUnit
 __all__ = ["STATUS", "GpuUnit"]
 
 STATUS = (*DRAWN, "late_bands", "frames_shown")
-"""Counters of `GpuUnit`: of the drawing, and of the display."""
+"""Counters of `GpuUnit`: those of `DrawUnit`, then those of `DisplayUnit`."""
 
 
 class GpuUnit(wiring.Component):

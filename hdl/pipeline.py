@@ -32,7 +32,7 @@ def span_shape(model: ShadingPipeline) -> data.StructLayout:
 
     - unit normals at the first and last pixel centre;
     - the ends of the true line;
-    - values of each light;
+    - the operands of each light at three places: the first pixel, the middle, the last pixel;
     - vectors N/W with their steps.
 
     Without lights there are no operands. With several materials there is ``material``, and with an albedo
@@ -84,16 +84,16 @@ def status_shape() -> data.StructLayout:
 class ShadingPipelineUnit(wiring.Component):
     """Shading pipeline of a design: any method, any reflection model, any number of lights.
 
-    An interpolator takes spans to the operands of their pixels. A light unit for each light takes operands to
-    terms, and the intensity unit takes terms to colours. For the transfer ``"srgb"`` a transfer unit encodes
-    the colours. The setup of the next spans overlaps the pixels of this span. A FIFO carries the coordinates
-    of the spans past all these units. `ShadingPipeline` is the bit-accurate model.
+    An interpolator makes the operands of pixels from spans. For each light a light unit makes terms from
+    operands. The intensity unit makes colours from terms. For the transfer ``"srgb"`` a transfer unit encodes
+    the colours. While the pixels of a span are made, the setup works on the next spans. A FIFO carries the
+    coordinates of the spans past all these units. `ShadingPipeline` is the bit-accurate model.
 
     The first pixel of a span leaves `latency` cycles after an empty pipeline has accepted it. Without stalls
     each span then takes at most ``max(cycles_per_pixel length, setup_interval)`` cycles, and in the
-    throughput style at least ``cycles_per_pixel length``. A short span that follows a long span takes the
-    fewest cycles, because up to two prepared spans wait before the accumulator. (``bisection`` takes longer
-    for several segments.) A span of length 0 is accepted like any other and gives no pixel.
+    throughput style at least ``cycles_per_pixel length``. Up to two spans may wait after their setup. So a
+    short span that follows a long span takes the fewest cycles. (``bisection`` takes more cycles for a span
+    of several segments.) A span of length 0 is accepted like every span, and gives no pixel.
 
     With a gate a highlight gate processes each span in parallel with the interpolator, and decides for each
     light. If the span has no highlight, the specular unit of the light keeps its state. In the compact style
@@ -112,10 +112,10 @@ class ShadingPipelineUnit(wiring.Component):
     - one for the specular terms of each light;
     - two for the products of each light with a normal, if the method finds normals;
     - one or two for the setup, as many as its longest interval needs;
-    - with an albedo, a third of the albedo's multipliers in the throughput style.
+    - with an albedo, a third of the multipliers that the albedo has in the throughput style.
 
-    ``quotient`` has ``ceil((2 + 2 lights) / 3)`` for its quotients and one for the setup. A pixel takes the
-    largest of three numbers of cycles:
+    In this style ``quotient`` has ``ceil((2 + 2 lights) / 3)`` multipliers for its quotients and one for the
+    setup. A pixel takes the largest of three numbers of cycles:
 
     - 3, also with one channel, because the products of a pixel share multipliers;
     - ``channels max(1, T)``, or ``channels (1 + T)`` with an albedo, where T is the number of its diffuse and
@@ -127,11 +127,11 @@ class ShadingPipelineUnit(wiring.Component):
     and ``latency`` are then those of a pixel with every term.
 
     A write is accepted when no span is inside, and no span is accepted while a write waits. So the constants
-    never change while spans are inside. ``i.ready`` falls on the cycle on which ``write.valid`` rises. It
-    rises 2 cycles after the last write was accepted. For the same reason a span of another material than the
-    span before it waits until no span is inside. It is accepted 5 cycles after the last pixel has left. Its
-    first pixel comes ``latency + 5`` cycles after this last pixel, in place of 1 cycle without the change.
-    Sort spans by material.
+    never change while spans are inside. ``i.ready`` falls on the cycle on which ``write.valid`` rises.
+    ``i.ready`` rises 2 cycles after the last write was accepted. For the same reason a span of another
+    material than the span before it waits until no span is inside. It is accepted 5 cycles after the last
+    pixel has left. Its first pixel comes ``latency + 5`` cycles after this last pixel. Without the change it
+    may come 1 cycle after. Sort spans by material.
 
     Parameters
     ----------
@@ -240,17 +240,17 @@ class ShadingPipelineUnit(wiring.Component):
 
     @property
     def _waiting_spans(self) -> int:
-        """Depth of the FIFOs parallel to interpolator and lights: the most spans that may be inside these."""
+        """Depth of the FIFOs beside interpolator and lights: the most spans that these may contain."""
         return max(-(-self.latency // self._shortest_interval) + UNCOUNTED, 17)
 
     @property
     def spans_inside(self) -> int:
         """Largest number of spans inside."""
-        # Two more wait behind the memory of the coordinates.
+        # Two more spans wait in registers behind the memory of the coordinates.
         return self._waiting_spans + 2 + self._assembler.SPANS_INSIDE
 
     def elaborate(self, platform):
-        """Frame constants, units from spans to colours, coordinates past them, admission, counters."""
+        """Frame constants, units from spans to colours, FIFO of coordinates, admission, counters."""
         m = Module()
         p = self.model
         # Whether a write was taken on the cycle before.
@@ -278,7 +278,7 @@ class ShadingPipelineUnit(wiring.Component):
         return m
 
     def _carry_coordinates(self, m: Module) -> tuple[Value, Value]:
-        """Carry the coordinates of spans to the assembler in a FIFO. Returns valid and ready of its input."""
+        """Make the FIFO that carries coordinates to the assembler. Returns valid and ready of its input."""
         p, assembler = self.model, self._assembler
         layout = coordinates_shape(p.x_bits, p.y_bits, p.length_bits)
         source = stream.Signature(layout).create(path=("source",))
@@ -323,9 +323,9 @@ class ShadingPipelineUnit(wiring.Component):
     def _admit(self, m: Module, frame: FrameConstantsUnit, sinks: list[tuple[Value, Value]]) -> Value:
         """Accept spans and writes. Returns whether a span of 1 pixel or more is accepted on this cycle.
 
-        A span is accepted if every sink is ready, by all sinks on the same cycle. A write is accepted while
-        no span is inside. Some interpolators take the words of a span in turns. They have begun the span
-        before it is accepted (`has_begun`).
+        If every sink is ready, all sinks accept the span on the same cycle. A write is accepted while no span
+        is inside. Some interpolators take the words of a span in turns. They have begun the span before it is
+        accepted (`has_begun`).
 
         Parameters
         ----------
@@ -344,7 +344,7 @@ class ShadingPipelineUnit(wiring.Component):
         begun = None if self._interpolator is None else self._interpolator.has_begun
         if begun is not None:
             hold, write_waits = hold | begun, write_waits & ~begun
-            # A span that has begun has pixels. So no path leads from the length then.
+            # A span that has begun has pixels. So in this case no path leads from the length to the sinks.
             has_pixels |= begun
         m.d.comb += [
             nonempty.eq(self.i.valid & has_pixels),
@@ -420,7 +420,7 @@ class ShadingPipelineUnit(wiring.Component):
         return sinks
 
     def _decide(self, m: Module, frame: FrameConstantsUnit, sinks: list) -> tuple[stream.Interface, Value]:
-        """Operands of the pixels, and the highlight gate's decision for each light. Appends to ``sinks``."""
+        """Hold the operands of each span until the gate has decided. Returns operands and decisions."""
         p, span = self.model, self.i.payload
         m.submodules.highlight_gate = gate = self._gate
         width = p.length_bits
@@ -440,7 +440,7 @@ class ShadingPipelineUnit(wiring.Component):
             decisions.w_data.eq(gate.o.payload),
             decisions.w_en.eq(gate.o.valid),
             gate.o.ready.eq(decisions.w_rdy),
-            # A pixel waits for the decision of its span. The length is there earlier.
+            # A pixel waits for the decision of its span. The length of the span comes before the decision.
             copy(operands.payload, source.payload),
             operands.valid.eq(source.valid & decisions.r_rdy),
             source.ready.eq(operands.ready & decisions.r_rdy),

@@ -32,8 +32,8 @@ def pixel_shape(x_bits: int = 12, y_bits: int = 12) -> data.StructLayout:
 class PixelAssemblerUnit(wiring.Component):
     """Joins the streams of colours and of spans' coordinates, counts x along the span and marks its end.
 
-    A colour leaves as a pixel 1 cycle after it was accepted. A colour is accepted on every cycle, if its
-    coordinates came a cycle before. Coordinates are accepted ahead of their colours. The unit has no
+    A colour leaves as a pixel 1 cycle after it was accepted. A colour is accepted on every cycle if its
+    coordinates came a cycle before. Coordinates may come long before their colours. The unit has no
     multipliers.
 
     Parameters

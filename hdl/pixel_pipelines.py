@@ -29,16 +29,16 @@ __all__ = [
 WAITING_SPANS = 512
 """Spans that wait before a pipeline in a memory.
 
-Block RAMs hold 512 words. A memory of 32 words in look-up tables takes more logic than the block RAMs' ports.
-If the spans of a mesh have about as many pixels as there are pipelines, the span port has no cycle to spare.
-Each cycle on which a full FIFO stops it is then lost. An example is the teapot of 10,712 triangles at
+Block RAMs hold 512 words. The logic around them takes less than a memory of 32 words in look-up tables. If
+the spans of a mesh have about as many pixels as there are pipelines, the span port has no cycle to spare.
+Each cycle on which a full FIFO stops this port is then lost. An example is the teapot of 10,712 triangles at
 640x480. With 32 words four pipelines give 3.3 times the pixels of one pipeline in a cycle. With 512 words
 they give 3.6 times the pixels.
 """
 
 
 def port_descriptions(pipes: int) -> dict[str, str]:
-    """Ports of `PixelPipelinesUnit`, for the table in its Verilog.
+    """Descriptions of the ports of `PixelPipelinesUnit`, for the table in its Verilog.
 
     Parameters
     ----------
@@ -49,13 +49,13 @@ def port_descriptions(pipes: int) -> dict[str, str]:
     pixels = {name: texts.pop(name) for name in PORT_DESCRIPTIONS if name.startswith("o_")}
     for pipe in range(pipes):
         texts |= {
-            name.replace("o_", f"o_{pipe}_"): f"{text}; pipeline {pipe}" for name, text in pixels.items()
+            name.replace("o_", f"o_{pipe}_"): f"{text}, from pipeline {pipe}" for name, text in pixels.items()
         }
     return texts
 
 
 _BEHIND = 2
-"""Spans in the registers behind the memory."""
+"""Number of spans in the registers behind the memory of a FIFO."""
 
 
 class PixelPipelinesUnit(wiring.Component):
@@ -72,10 +72,11 @@ class PixelPipelinesUnit(wiring.Component):
 
     A write goes to all pipelines. It is accepted when no span is in a FIFO or a pipeline. No span is accepted
     while a write waits. The first pixel leaves an idle unit `latency` cycles after its span was accepted.
-    Every pipeline has its own frame constants. At a change of the material it waits only for its own spans.
+    Every pipeline has its own frame constants. If the material changes, a pipeline waits only for its own
+    spans.
 
     Counters of ``status`` are the sums of the pipelines' counters. Like the pipelines' counters they stop at
-    their largest value. The sums come a cycle later for each doubling of the number of pipelines.
+    their largest value. Each doubling of the number of pipelines adds a cycle to the latency of the sums.
 
     Parameters
     ----------
@@ -125,7 +126,7 @@ class PixelPipelinesUnit(wiring.Component):
         return self.pipelines[0].spans_inside + self._waiting + _BEHIND
 
     def elaborate(self, platform):
-        """A FIFO and a pipeline for each remainder of y; writes to all; sums of the counters."""
+        """A FIFO and a pipeline for each remainder of y, writes to all pipelines, and sums of counters."""
         m = Module()
         span, write = self.i, self.write
         pipe = span.payload.y[: (len(self.pipelines) - 1).bit_length()]
@@ -220,7 +221,7 @@ class WidePipelinesUnit(_JoinedPipelines):
         super().__init__(model, waiting, PixelLanesUnit, lanes_shape)
 
     def elaborate(self, platform):
-        """The pipelines, and their pixels on a cycle as one beat."""
+        """The pipelines, and the unit that joins the pixels of a cycle to one beat."""
         m = Module()
         m.submodules.pipelines, m.submodules.lanes = pipelines, lanes = self.pipelines, self._join
         connect(m, wiring.flipped(self.i), pipelines.i)
@@ -233,7 +234,7 @@ class WidePipelinesUnit(_JoinedPipelines):
 
 
 class MergedPipelinesUnit(_JoinedPipelines):
-    """`PixelPipelinesUnit` with one stream of pixels in the order of the spans, as one pipeline gives it.
+    """`PixelPipelinesUnit` with one stream of pixels. They have the order in which one pipeline gives them.
 
     The unit gives at most a pixel a cycle. So several pipelines gain speed only if each takes several cycles
     for a pixel, as in the compact style.

@@ -45,7 +45,7 @@ class PixelShading:
     transfer : TransferUnit or None
         Transfer unit, if the transfer is not linear.
     light_latency, latency : int
-        Latency from the operands to the terms, and to the colours.
+        Cycles from the operands to the terms, and cycles from the operands to the colours.
     cycles_per_pixel : int
         Cycles that a pixel with every term takes.
     """
@@ -57,7 +57,7 @@ class PixelShading:
         if p.lights or p.albedo:
             self.intensity = intensity_unit(p.intensity, p.build.compact)
         if p.transfer != "linear":
-            # Constant colours are encoded all the time.
+            # Constant colours are encoded on every cycle.
             channels = p.intensity.channels
             interval = channels if p.build.compact and self.intensity is not None else 1
             self.transfer = TransferUnit(channels=channels, initiation_interval=interval)
@@ -163,7 +163,7 @@ class PixelShading:
         connect(m, intensity.o, self._encoded(m, colors))
 
     def connect_tables(self, m: Module, write: data.View, written: Value) -> None:
-        """Connect the tables of the lights, if there are any, and load them by writes of frame constants.
+        """Connect the tables of the lights, if the lights have tables. Writes of frame constants load them.
 
         Parameters
         ----------
@@ -191,7 +191,7 @@ class PixelShading:
     def _connect_lights(
         self, m: Module, operands: stream.Interface | None, albedo: stream.Interface | None
     ) -> None:
-        """Handshakes from the operands through all lights to the intensity unit, where the albedo joins.
+        """Connect operands, lights, albedo and intensity unit, with their handshakes.
 
         In lockstep equal units with the same handshakes are in the same state on every cycle. So the
         handshake of the first unit serves all. If lights skip beats, either all lights accept a beat on a

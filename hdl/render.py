@@ -31,40 +31,40 @@ STATUS = (*COUNTERS, "spans", "pixels", "hidden", "dropped", "out_of_range_spans
 """Counters of `RendererUnit`."""
 
 PORT_DESCRIPTIONS = {
-    "i_x": "columns of the three corners, in any order",
+    "i_x": "columns of the three corners; the corners have any order",
     "i_y": "rows of the three corners",
     "i_depth": "depths of the three corners; a smaller depth is nearer",
-    "i_normal": "component (second index) of a corner's (first index) N/W",
-    "i_surface": "attribute (second index) of the surface at a corner (first index), see above",
-    "i_base": "whole texel from which u or v of the triangle counts, -4096 to 4095",
-    "i_range": "a coordinate is base + attribute times 2^range texels of the level, 0 to 11",
+    "i_normal": "N/W of the corners; first index: corner, second index: component",
+    "i_surface": "attributes of the surface, listed above; first index: corner, second index: attribute",
+    "i_base": "base of u or v: whole texel from which it is counted, -4096 to 4095",
+    "i_range": "range of u or v, 0 to 11: the coordinate is base + attribute 2^range texels",
     "i_level": "level of the texture, 0 to 15",
-    "i_material": "index of the triangle's material; a larger index counts as the last",
-    "i_two_sided": "with back_faces 2: 1 turns the normals of a back face, 0 culls it",
+    "i_material": "index of the triangle's material; an index past the last material counts as the last",
+    "i_two_sided": "read if back_faces is 2: 1 turns the normals of a back face, 0 culls the face",
     "o_x": "column of the pixel",
     "o_y": "row of the pixel",
     "o_r": "red",
     "o_g": "green",
     "o_b": "blue",
     "o_depth": "depth of the pixel",
-    "write_address": "frame constant to write, see above",
-    "write_data": "code of the frame constant; accepted when no span is inside",
+    "write_address": "address of the frame constant to write, from the list above",
+    "write_data": "code of the frame constant; the core accepts it when no span is inside",
     "constants_left": "first column of the picture on the grid; o_x counts from it",
-    "constants_top": "first row; o_y counts from it",
+    "constants_top": "first row of the picture on the grid; o_y counts from it",
     "constants_right": "column after the last column",
     "constants_bottom": "row after the last row",
-    "constants_back_faces": "see above",
-    "constants_limit": "chord of the widest span in 1/1024, see above",
-    "constants_picture": "change it for each picture: this clears the depths",
+    "constants_back_faces": "treatment of back faces: 0 flip, 1 show, 2 cull",
+    "constants_limit": "largest chord between the unit normals of a span's ends, in 1/1024",
+    "constants_picture": "bit; change it for each picture: a change clears the depths",
     **{f"status_{name}": COUNTER_TEXTS[name] for name in STATUS},
     "memory_read_place": "pixel whose depth is read",
-    "memory_read_enable": "1 reads; with 0 the data stays",
-    "memory_read_data": "depth of that pixel, on the next clock",
+    "memory_read_enable": "1 reads a depth; with 0 memory_read_data stays",
+    "memory_read_data": "depth at memory_read_place, one clock later",
     "memory_write_place": "pixel whose depth is written",
-    "memory_write_enable": "1 writes",
-    "memory_write_data": "depth of that pixel; all ones while the memory is cleared",
+    "memory_write_enable": "1 writes memory_write_data",
+    "memory_write_data": "depth for memory_write_place; all ones while the core clears the memory",
 }
-"""Ports without a ``size``, for the table in Verilog."""
+"""Ports of a unit without a ``size`` (the memory of its depths is outside), for the table in Verilog."""
 
 _DEEP = {"depth": FixedShape(SPAN_DEPTH), "depth_step": FixedShape(DEPTH_STEP)}
 """Words of a span for the depth test. Shading does not take them."""
@@ -73,28 +73,33 @@ _COMPONENTS = 3
 """Components of a vector of geometry."""
 
 WAITING_SPANS = 512
-"""Spans between geometry and shading, in block RAMs. In the compact style only spans of vectors wait there.
+"""Spans that may wait between geometry and shading, in a FIFO of block RAMs.
 
-Shading works on these spans while small triangles are set up, or spans are cut. While shading has large
-spans, the setup goes on.
+While geometry sets up small triangles or cuts spans, shading works on the waiting spans. While shading works
+on long spans, geometry goes on. The compact style has this FIFO only if spans have vectors, or if there is a
+coarse test. In other compact designs one span waits in a register.
 """
 
 
 class RendererUnit(wiring.Component):
     """Turns triangles into the pixels to write. `Renderer` is the bit-accurate model.
 
-    The unit has `GeometryUnit`, `ShadingPipelineUnit` and `DepthTesterUnit` in a row. Spans wait between the
-    first two in a FIFO. (In the compact style without vectors and coarse test one span waits in a register.)
-    The depths of the spans pass the pipeline in another FIFO. With a coarse depth test a span also waits in
-    the FIFO for the test's answer. Then the span leaves, or is dropped in one cycle. The units work at the
-    same time. If no unit waits for long, a frame takes as many cycles as the slowest unit alone. The design's
-    `Build` has the styles, the lanes of triangle setup and the coarse test.
+    Triangles go through `GeometryUnit`, `ShadingPipelineUnit` and `DepthTesterUnit`. Spans wait for the
+    pipeline in a FIFO or a register (`WAITING_SPANS`). The depths of the spans go beside the pipeline, in
+    another FIFO. With a coarse depth test a span also waits for the test's answer. Then the pipeline takes
+    the span, or the unit drops it in one cycle. The units work at the same time. If no unit waits for long, a
+    frame takes as many cycles as the slowest unit alone. The design's `Build` has the styles, the lanes of
+    triangle setup and the coarse test.
 
-    Frame constants are written while no span is inside. Spans of another material than the span before wait
-    until the pipeline is empty, see `ShadingPipelineUnit`. Behind the FIFO up to two units make the
-    components of vectors that geometry does not have: `LightAdapterUnit`, and with highlights of R·V
-    `MirrorAdapterUnit`. `LightAdapterUnit` has its own memories for the axes of further lights.
-    `MirrorAdapterUnit` reads L of the first light. Write both before the frame's first triangle.
+    Frame constants are written while no span is inside. If the material changes from a span to the next, the
+    next span waits until the pipeline is empty, see `ShadingPipelineUnit`.
+
+    Geometry makes the vectors of a span for the first light. Behind the FIFO up to two units add components:
+
+    - `LightAdapterUnit` for further lights. It has its own memories for their axes;
+    - `MirrorAdapterUnit` for highlights of R·V. It reads L of the first light.
+
+    Write the axes and L before the frame's first triangle.
 
     Parameters
     ----------
@@ -103,8 +108,8 @@ class RendererUnit(wiring.Component):
     size : (int, int) or None
         As for `DepthTesterUnit`.
     clears : bool
-        Whether the memory of depths is cleared for each picture, see `DepthTesterUnit`. If not, the unit
-        draws one picture only, unless the memory outside is cleared between pictures.
+        Whether the unit clears the memory of depths for each picture, see `DepthTesterUnit`. If it does not,
+        it draws only one picture, unless you clear the memory outside between pictures.
 
     Members
     -------
@@ -115,12 +120,12 @@ class RendererUnit(wiring.Component):
     write : :py:`In(stream.Signature(write_shape()))`
         Frame constants of the shading pipeline.
     constants : :py:`In(frame_shape())`
-        The picture's borders and options, constant while triangles are inside. With a coarse depth test, or
-        if the unit clears, also a bit ``picture``, which changes from picture to picture.
+        The picture's borders and options, constant while triangles are inside. If there is a coarse depth
+        test or the unit clears the depths, also a bit ``picture``, which changes from picture to picture.
     status : :py:`Out(counters_shape(*STATUS))`
         Counters since the reset.
     memory : :py:`Out(DepthMemory(x_bits, y_bits))`
-        Memory of the depths. Only without a ``size``.
+        Port of the memory of depths. Only without a ``size``.
 
     Attributes
     ----------
@@ -157,7 +162,7 @@ class RendererUnit(wiring.Component):
         self.idle = Signal(name="idle")
 
     def elaborate(self, platform):
-        """The three units; a span goes to the pipeline, and its depth to a FIFO, on the same cycle."""
+        """Connect the three units. On the same cycle a span goes to the pipeline, and its depth to a FIFO."""
         m = Module()
         geometry, pipeline, depth = self.geometry, self.pipeline, self.depth
         m.submodules.geometry, m.submodules.pipeline, m.submodules.depth = geometry, pipeline, depth
@@ -186,7 +191,8 @@ class RendererUnit(wiring.Component):
         ]
         known, drops = self._judge(m, source, room, made.ready, ready)
         if geometry.compact and not geometry.vectors and self.coarse is None:
-            # A FIFO's memories of 16 words would cost as much as they save.
+            # A FIFO of 16 words in look-up tables would save some cycles, and cost as much logic as these
+            # save.
             connect_register(m, "waiting_span", made, ready)
         else:
             connect_late_fifo(m, "spans", made, ready, WAITING_SPANS)
@@ -292,7 +298,7 @@ class RendererUnit(wiring.Component):
     def _judge(
         self, m: Module, span: stream.Interface, room: Signal, taken: Value, head: stream.Interface
     ) -> tuple[Value, Value]:
-        """Whether the coarse depth test has answered for the first span that waits, and whether it is hidden.
+        """Whether the first waiting span has its answer of the coarse depth test, and whether it is hidden.
 
         The coarse depth test also gets the spans of geometry, while it has ``room``. Without the test every
         span counts as answered and visible.
@@ -302,8 +308,8 @@ class RendererUnit(wiring.Component):
             return Const(1), Const(0)
         m.submodules.coarse = coarse = self.coarse
         place = coarse.i.payload
-        # ``number`` changes with the first span of a picture. After pictures without spans ``picture`` may be
-        # the same as before.
+        # ``number`` changes with the first span of each picture. ``picture`` itself does not serve: after a
+        # picture without spans it may have the same value as at the last span.
         number, before, turned = (Signal(name=name) for name in ("number", "picture_before", "turned"))
         turns = turned | (self.constants.picture != before)
         m.d.sync += [before.eq(self.constants.picture), turned.eq(turns)]
@@ -327,12 +333,12 @@ class RendererUnit(wiring.Component):
 
 
 def _flat(payload: data.View) -> dict[str, Value]:
-    """Fields by name, of a payload with a span's words and its depths side by side."""
+    """Fields by name, of a payload that has a span's words and depths in one structure."""
     return {name: payload[name] for name in payload.shape().members}
 
 
 def _nested(payload: data.View) -> dict[str, Value]:
-    """Fields by name, of a payload with a span's words in a member ``span``, and its depths."""
+    """Fields by name, of a payload that has a span's words in a member ``span``, and the depths beside it."""
     return _flat(payload.span) | {name: payload[name] for name in _DEEP}
 
 

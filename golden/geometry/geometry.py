@@ -24,12 +24,14 @@ from blysk.golden.number.fixed import Fixed
 __all__ = ["COUNTERS", "Geometry"]
 
 COUNTERS = ("empty", "zero_area", "culled", "sliver", "cut", "repaired")
-"""Counters: triangles without a span, without area, culled, slivers; spans cut; normals repaired."""
+"""Counters of triangles (no pixel, no area, culled, slivers), of cut spans and of repaired normals."""
 
 
 @dataclass(frozen=True)
 class Geometry:
-    """A chain of bit-accurate models, from `VertexSort` to `EdgeNormals`, `LineAdapter` or `VectorAdapter`.
+    """Bit-accurate model of geometry.
+
+    It is a chain of models, from `VertexSort` to `EdgeNormals`, `LineAdapter` or `VectorAdapter`.
 
     Parameters
     ----------
@@ -79,7 +81,7 @@ class Geometry:
     def rows(
         self, triangles: Triangles, frame: FrameSettings
     ) -> tuple[SortedTriangles, ClippedRows, np.ndarray, dict[str, int]]:
-        """Coverage alone: sorted triangles, clipped scanlines with their triangles, and counts so far."""
+        """Sorted triangles, clipped scanlines with the index of their triangle, and the counts so far."""
         drawn, counts = VertexSort(self.grid).compute(triangles, frame)
         edges = EdgeSetup(self.grid).compute(drawn)
         rows = EdgeWalk().compute(edges, drawn, frame)
@@ -159,7 +161,7 @@ class Geometry:
             raise ValueError("texture coordinates need a base, a range and a level of each triangle")
 
     def _shaded(self, pieces: Pieces) -> tuple[TrueSpans | LineSpans | VectorSpans, int]:
-        """The part of pieces that the pipeline reads, and the number of repaired normals."""
+        """Spans of the pieces, with the words that the pipeline reads, and the number of repaired normals."""
         if self.lines or self.vectors:
             return (LineAdapter() if self.lines else VectorAdapter(self.rotates)).compute(pieces), 0
         return EdgeNormals().compute(pieces)

@@ -77,7 +77,8 @@ class QuadraticInterpolator(NormalInterpolator):
 
     @property
     def degrees(self) -> Sequence[int]:
-        """Degrees of the middle normal: 2, a plain minimax fit, or 3, the default. Published: no choice."""
+        """Degrees of the polynomial for the middle normal: 2 (a plain minimax fit) or 3 (the default)."""
+        # The published form has no choice.
         return () if self.middle_normal == MiddleNormal("as_published") else (2, 3)
 
     def with_degree(self, degree: int) -> Interpolator:
@@ -90,9 +91,13 @@ class QuadraticInterpolator(NormalInterpolator):
     def normal_error(self) -> float:
         """Errors of the middle normal, of the form that evaluates the curve, and of the last rounding.
 
-        With forward differences the form adds ``2^-17 |P| + (2^-16 + 2^-17 + 2^-34) |G|`` for the reciprocal
-        of the length, with |P| <= 0.83 and |G| <= 0.305, and `difference_rounding` at pixel 4094. The sum is
-        4.4 steps of 2^-17 with the default middle normal.
+        Forward differences add two errors:
+
+        - ``2^-17 |P| + (2^-16 + 2^-17 + 2^-34) |G|`` for the reciprocal ``1/(m-1)``, where |P| <= 0.83 and
+          |G| <= 0.305;
+        - `difference_rounding` at pixel 4094.
+
+        The sum is 4.4 steps of 2^-17 with the default middle normal.
         """
         middle = np.sqrt(3) * self.middle_normal.error
         if self.form != "differences":
@@ -103,12 +108,16 @@ class QuadraticInterpolator(NormalInterpolator):
 
     @staticmethod
     def _reciprocal_error(p: float, g: float) -> float:
-        """Error of a normal by the error of ``1/(m-1)``, for lengths p of P and g of G."""
+        """Error of a normal from the error of ``1/(m-1)``, if P is p long and G is g long."""
         return 2.0**-17 * p + (2.0**-16 + 2.0**-17 + 2.0**-34) * g
 
     @property
     def shortest_length(self) -> float:
-        """Root of the least ``1 - (1-c)^2 s^2 (1 - s^2)``, which is at ``s^2 = 1/2``; ``c = cos(psi/2)``."""
+        """Least length of a normal on the curve, for the largest angle psi of a gate.
+
+        With ``s = 2t - 1`` and ``c = cos(psi/2)`` the squared length is ``1 - (1-c)^2 s^2 (1 - s^2)``. Its
+        minimum is at ``s^2 = 1/2``.
+        """
         return float(np.sqrt(1 - (1 - np.cos(np.radians(self.gate_angle / 2))) ** 2 / 4))
 
     def operand_error(self, length: int, degrees: float) -> float:

@@ -20,13 +20,16 @@ __all__ = ["METHODS", "PUBLISHED", "RecurrenceInterpolator"]
 
 @dataclass(frozen=True)
 class RecurrenceInterpolator(EndNormalInterpolator):
-    """``cos gamma(t) = cos beta cos(lambda - t psi)`` by the recurrence, for L and H of each light.
+    """The cosines N·L and N·H by the recurrence: ``cos gamma(t) = cos beta cos(lambda - t psi)``.
 
-    Formats and error bounds are those of `RecurrenceSetup` and `Recurrence`, whose results have 25 fraction
-    bits here: N·L unchanged, ``SQ(2, 25)``, and ``1 - N·H``, ``UQ(1, 25)``, saturated. The error e of 1 - N·H
-    does not depend on its size. So the error of the specular term is about ``n e`` at the peak. At n = 1000
-    it is 0.08 LSB for spans of 1 degree (e = 3e-7) and 3 LSB for spans of 45 degrees (e = 1.2e-5). Spans over
-    90 degrees are flagged.
+    gamma is the angle between the normal and a fixed vector, L or H. beta is the angle of this vector to the
+    plane of the great circle. lambda is the angle from ``N_l`` to its projection on this plane.
+
+    Formats and error bounds are those of `RecurrenceSetup` and `Recurrence`. The results of the recurrence
+    have 25 fraction bits here. N·L is the result itself, in ``SQ(2, 25)``. ``1 - N·H`` is computed from the
+    result for H, and saturated to ``UQ(1, 25)``. The error e of 1 - N·H does not depend on its size. So the
+    error of the specular term is about ``n e`` at the peak. At n = 1000 it is 0.08 LSB for spans of 1 degree
+    (e = 3e-7) and 3 LSB for spans of 45 degrees (e = 1.2e-5). Spans over 90 degrees are flagged.
 
     Parameters
     ----------
@@ -66,7 +69,7 @@ class RecurrenceInterpolator(EndNormalInterpolator):
 
     @property
     def highlight_excess(self) -> float:
-        """Error of setup and recurrence, plus errors of lengths and of the cut.
+        """Error of setup and recurrence, plus the errors of the lengths of N and H, and of dropped bits.
 
         It is largest for spans of two pixels.
         """
@@ -88,7 +91,7 @@ class RecurrenceInterpolator(EndNormalInterpolator):
         direction: Fixed,
         halfway: Fixed,
     ) -> Operands:
-        """Bit-accurate operands."""
+        """Bit-accurate operands of every pixel."""
         span, index = pixels_of(length)
         shape = (len(span), len(direction.codes))
         results = np.zeros((2, *shape), dtype=np.int64)
@@ -117,5 +120,5 @@ class RecurrenceInterpolator(EndNormalInterpolator):
 METHODS = {RecurrenceInterpolator(): "equal angles on the great circle, each cosine from the two before"}
 """The method of this module, and a line about it."""
 
-PUBLISHED = {RecurrenceInterpolator("direct"): "the recurrence as drawn, which is unstable"}
+PUBLISHED = {RecurrenceInterpolator("direct"): "the recurrence as in figure 3.5, which is unstable"}
 """The method with formula 3.3 as published."""

@@ -18,14 +18,14 @@ from blysk.hdl.port_descriptions import COUNTER_TEXTS
 __all__ = ["BUSES", "PORT_DESCRIPTIONS", "AxiStream", "BusUnit", "core_of"]
 
 BUSES = {"axi": ("s_axil", AxiLite, AxiLiteUnit), "wishbone": ("wb", Wishbone, WishboneUnit)}
-"""Buses by name: the member for registers, its signature, and the unit behind it."""
+"""For each name of a bus: the member for registers, its signature, and the unit that adapts it."""
 
 PORT_DESCRIPTIONS = {
-    "s_axis_tdata": "one triangle or span, see above",
-    "s_axis_tlast": "the last beat of the frame",
-    "m_axis_tdata": "one pixel or span, see above",
+    "s_axis_tdata": "bytes of one triangle or span, in the layout above",
+    "s_axis_tlast": "1 in the last beat of a frame",
+    "m_axis_tdata": "bytes of one pixel or span, in the layout above",
     "m_axis_tkeep": "all ones",
-    "m_axis_tlast": "the last beat of a packet, see above",
+    "m_axis_tlast": "1 in the last beat of a packet, as said above",
     "m_axis_tuser": "bit 0: the first beat of the frame; bit 1: the last beat",
 }
 """Ports of the streams, for the table in Verilog."""
@@ -111,7 +111,7 @@ class BusUnit(wiring.Component):
         super().__init__(members)
 
     def elaborate(self, platform):
-        """The front of the bus, the registers, the framed core."""
+        """The adapter of the bus, the registers, and the core with its framing."""
         m = Module()
         m.submodules.framing = framing = self.framing
         m.submodules.registers = registers = self._registers

@@ -16,7 +16,7 @@ from blysk.hdl.geometry.triangles import COUNTER_BITS, count_events
 __all__ = ["FramingUnit", "given_shape", "made_shape"]
 
 _SETTLES = 3
-"""Cycles until the logic that watches the core counts a beat that the core has taken."""
+"""Cycles from a beat that the core takes until the logic that watches the core has counted the beat."""
 
 
 def given_shape(layout: ByteLayout) -> data.StructLayout:
@@ -25,7 +25,7 @@ def given_shape(layout: ByteLayout) -> data.StructLayout:
 
 
 def made_shape(layout: ByteLayout) -> data.StructLayout:
-    """Shape of an outgoing beat: bytes; ``last`` of a packet; ``first`` and ``end`` of a frame."""
+    """Shape of an outgoing beat: bytes, and flags: ``last`` of a packet, ``first`` and ``end`` of a frame."""
     return data.StructLayout({"data": data.ArrayLayout(8, layout.size), "last": 1, "first": 1, "end": 1})
 
 
@@ -35,7 +35,7 @@ class FramingUnit(wiring.Component):
     A frame ends with a beat that has ``last``. No beat is accepted after it until the core is empty and the
     frame's last beat has been accepted at the output. So beats of two frames are never inside together, and
     constants can change in between. Each output beat is held back until the next beat comes or the frame
-    ends. Only then the unit knows whether the beat is the last. This costs 2 cycles of latency, and no
+    ends. Only then does the unit know whether the beat is the last. This costs 2 cycles of latency, and no
     throughput. A frame without output gives no beat; ``frames`` counts it. Depths begin anew with each frame,
     unless the constant ``keep`` is 1. Then the frame adds to the picture of the frame before.
 
@@ -58,8 +58,8 @@ class FramingUnit(wiring.Component):
         Counters of the core, and three more fields:
 
         - ``frames``: number of ended frames;
-        - ``misfits``: number of beats with a number that outgrew its field. The low bits of the number are
-          taken. For an index past the last material the last material is taken;
+        - ``misfits``: number of beats with a number that does not fit its field. The unit takes the low bits
+          of the number. If the number is an index past the last material, the unit takes the last material;
         - ``busy``: a frame is inside.
 
     Source: docs/theory/bus.md#streams; not in the documents.
@@ -137,7 +137,7 @@ class FramingUnit(wiring.Component):
         return m
 
     def _give(self, m: Module, empty: Value) -> Value:
-        """Hold a beat back, and give the beat before it. Returns whether the frame has left."""
+        """Hold a beat back, and give the beat before it. Returns whether all beats of the frame have left."""
         made, shape = self.core.o, self.core.o.payload.shape()
         held, waiting = Signal(shape, name="held_back", reset_less=True), Signal(name="waiting")
         word, valid = Signal(self.o.payload.shape(), name="word", reset_less=True), Signal(name="valid")

@@ -47,8 +47,8 @@ class RegistersUnit(wiring.Component):
     An access is answered 2 cycles after it was accepted. The next access is accepted when the answer has been
     taken. A refused access changes only the registers ``errors`` and ``refused``. Registers of the picture
     and frame constants are written as whole words, while ``busy`` is low. A written 1 clears its bit of
-    ``errors`` at any time, also in a write of single bytes. Ones above the bits of ``errors`` have no effect.
-    A read of a byte gets the whole word.
+    ``errors`` at any time, also in a write of single bytes. A written 1 above the bits of ``errors`` has no
+    effect. A read of a byte gets the whole word.
 
     Parameters
     ----------
@@ -62,7 +62,7 @@ class RegistersUnit(wiring.Component):
     o : :py:`Out(stream.Signature(answer_shape()))`
         Answers to the accesses.
     constants : :py:`In(...)`
-        State of the core: ``busy``, and its counters by name.
+        State of the core: ``busy``, and the core's counters by name.
     picture : :py:`Out(...)`
         Registers of the picture by name, if there are any.
     load : :py:`Out(...)`
@@ -122,7 +122,7 @@ class RegistersUnit(wiring.Component):
         return m
 
     def _decide(self, m: Module, access, held) -> tuple[Signal, Signal]:
-        """Causes to refuse the access in the register, one bit for each, and the word that a read gets."""
+        """One bit for each cause to refuse the held access, and the word that a read gets."""
         cause, word = Signal(len(ERRORS), name="cause"), Signal(WORD_BITS, name="word")
         found, fits = Signal(name="found"), Signal(name="fits")
         readable, writable, clears = (Signal(name=name) for name in ("readable", "writable", "clears"))
@@ -165,14 +165,14 @@ def _shape(register: Register):
 
 
 def _fits(register: Register, word: Value) -> Value:
-    """Whether a word of 32 bits is the extension of a value in the register's range."""
+    """Whether a word of 32 bits is a value of the register's range, extended by its sign or by zeros."""
     above, fits = word[register.width :], Const(1)
     if len(above):
         fits = above == (word[register.width - 1].replicate(len(above)) if register.signed else 0)
     if register.range is not None:
         code, (low, high) = Value.cast(word[: register.width]), register.range
         code = code.as_signed() if register.signed else code
-        # Verilator would warn of a comparison that every code passes.
+        # If every code passes, there is no comparison, because Verilator would warn of it.
         fits &= Const(1) if low == 0 and not register.signed else code >= low
         fits &= code <= high
     return fits

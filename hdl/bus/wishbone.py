@@ -36,8 +36,8 @@ class WishboneUnit(wiring.Component):
     """Adapter from Wishbone to accesses, one at a time.
 
     A request is taken on a cycle on which ``stall`` is low. From the next cycle to the cycle of ``ack`` or
-    ``err`` ``stall`` is high. So a classic initiator, which keeps ``stb`` until its answer, asks once, and a
-    pipelined initiator waits. Both need no other wiring. A classic initiator leaves ``stall`` open. If an
+    ``err`` ``stall`` is high. A classic initiator keeps ``stb`` until its answer, and so asks once. A
+    pipelined initiator waits. Neither needs other wiring. A classic initiator leaves ``stall`` open. If an
     initiator ends the bus cycle before the answer, it gets no answer. Its write may have been made. ``ack``,
     ``err`` and ``stall`` are registers.
 

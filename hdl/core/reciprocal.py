@@ -68,7 +68,7 @@ def reciprocal_words(
     length_bits : int
         Bits of the length, 2 to 12.
     since : int or Word
-        First stage that may hold m - 1, or a word with the same stage.
+        First stage that may hold m - 1: its number, or a word that is in this stage.
 
     Returns
     -------

@@ -162,7 +162,7 @@ def _declared(name: str, text: str) -> re.Match:
 
 
 def _leaves(shape: ShapeLike, offset: int = 0) -> Iterator[tuple[tuple, ShapeLike, int]]:
-    """Path, shape and offset of every field of a shape that is not itself a structure or an array."""
+    """Path, shape and offset of each field that is neither a structure nor an array, also of inner fields."""
     layout = shape
     if isinstance(shape, type) and issubclass(shape, data.Struct):
         layout = data.Layout.cast(shape)

@@ -34,26 +34,26 @@ from blysk.hdl.geometry.vertex_sort import VertexSortUnit, sorted_triangle_shape
 __all__ = ["PORT_DESCRIPTIONS", "WAITING_TRIANGLES", "GeometryUnit"]
 
 PORT_DESCRIPTIONS = {
-    "normal_left": "unit normal at the first pixel; or N/W, the end of a true line",
-    "normal_right": "unit normal at the last pixel; or N/W, the end of a true line",
+    "normal_left": "first pixel: unit normal (in SQ(1, 17)) or N/W of a true line (in SQ(1, 22))",
+    "normal_right": "last pixel: unit normal (in SQ(1, 17)) or N/W of a true line (in SQ(1, 22))",
     "start": "N/W at the first pixel, in the frame of the light",
-    "step": "its step to the next pixel, times 2^exponent",
-    "exponent": "exponent of the step",
-    "attributes_start": "attributes of the surface at the first pixel, times s; then s",
-    "attributes_step": "their steps to the next pixel, times 2^attributes_exponent",
-    "attributes_exponent": "exponent of these steps, 0 to 9",
-    "attributes_base": "whole texel from which u or v counts",
-    "attributes_range": "a coordinate is base + attribute times 2^range texels of the level",
+    "step": "step of N/W to the next pixel, times 2^o_exponent",
+    "exponent": "exponent of o_step, 0 to 15",
+    "attributes_start": "attributes of the surface at the first pixel, times s; the last word is s",
+    "attributes_step": "step of these words to the next pixel, times 2^o_attributes_exponent",
+    "attributes_exponent": "exponent of o_attributes_step, 0 to 9",
+    "attributes_base": "base of u or v: whole texel from which it is counted",
+    "attributes_range": "range of u or v: the coordinate is base + attribute 2^range texels",
     "attributes_level": "level of the texture",
     "line_left": "N/W at the first pixel",
     "line_right": "N/W at the last pixel",
     "x": "column of the first pixel",
-    "y": "row",
-    "length": "pixels of the span",
+    "y": "row of the span",
+    "length": "number of pixels of the span",
     "depth": "depth at the first pixel",
     "depth_last": "depth at the last pixel",
     "depth_step": "step of the depth from a pixel to the next",
-    "flip": "the normals have been negated: a back face",
+    "flip": "1 if the span is of a back face, whose normals have been negated",
     "material": "index of the triangle's material",
 }
 """Fields of a span, for the table in Verilog."""
@@ -79,7 +79,7 @@ The counters wrap. Their difference is right, because fewer than 2^10 triangles 
 
 
 class _TriangleSetup(wiring.Component):
-    """One of the lanes of `GeometryUnit`: it makes edges for the walk, and planes, from sorted triangles.
+    """A lane of `GeometryUnit`. From sorted triangles it makes planes, and edges for the walk.
 
     Parameters
     ----------
@@ -144,7 +144,7 @@ class _TriangleSetup(wiring.Component):
         if not self._compact:
             depth = max(depth + UNCOUNTED, BLOCK_WORDS)
         connect_late_fifo(m, "waiting_attributes", serialiser.o, attributes, depth)
-        # The plane setup goes on with the next triangle while the gradients of this one are computed.
+        # While the gradients of a triangle are computed, the plane setup goes on with the next triangle.
         connect_register(m, "waiting_scale", planes.o, scales)
         to, turn = self._gradients.i, Signal(range(self._count), name="turn")
         moves = to.valid & to.ready
@@ -184,14 +184,14 @@ class GeometryUnit(wiring.Component):
       that the sort drops takes 4 to 9 cycles, or 5 to 15 in the compact style (`VertexSortUnit`);
     - in the walk `row_cycles` for each scanline without pixels in the picture: 1, or the number of attributes
       in the compact style;
-    - for a span, or a piece of it, of p pixels as many cycles as ``p - 1`` has bits. The least is 1 cycle for
-      1 pixel, 2 cycles for 2 pixels and 3 cycles for more. With ``lines`` or ``vectors`` the least is 1 cycle
-      for any number of pixels. A span never takes more cycles than it has pixels. If n pixels are cut off at
-      the long edge, the scanline takes one more cycle for each bit of n. In the compact style a scanline
-      takes a cycle for each attribute, four without a surface, and as many more for every two of these bits.
-      At the same time the normals take three cycles each. With ``vectors`` a span takes two more cycles each
-      time that it does not fit, and for each piece behind the first (`SpanHalverUnit`). In the compact style
-      a piece takes 13 cycles or more at the same time, and with a surface 3 more for each of its attributes
+    - for a span or piece of p pixels as many cycles as ``p - 1`` has bits. The least is 1 cycle for 1 pixel,
+      2 cycles for 2 pixels and 3 cycles for more. With ``lines`` or ``vectors`` the least is 1 cycle for any
+      number of pixels. A span never takes more cycles than it has pixels. If n pixels are cut off at the long
+      edge, the scanline takes one more cycle for each bit of n. In the compact style a scanline takes a cycle
+      for each attribute, four without a surface, and as many more for every two of these bits. At the same
+      time the normals take three cycles each. With ``vectors`` a span takes two more cycles for each piece
+      behind the first, and each time that a piece does not fit (`SpanHalverUnit`). In the compact style a
+      piece takes 13 cycles or more at the same time, and with a surface 3 more for each of its attributes
       (`SerialVectorsUnit`).
 
     The number of multipliers is `multipliers`: 10, or 5 in the compact style. With ``lines`` or ``vectors``
@@ -421,7 +421,7 @@ def _turns(m: Module, name: str, moving: stream.Interface, count: int, each: int
 
 
 def _fork(m: Module, source: stream.Interface, first: stream.Interface, second: stream.Interface) -> None:
-    """Two streams take a payload on the same cycle. The caller connects the fields."""
+    """Fork a stream: two streams take its payload on the same cycle. The caller connects the fields."""
     m.d.comb += [
         first.valid.eq(source.valid & second.ready),
         second.valid.eq(source.valid & first.ready),

@@ -27,7 +27,7 @@ from blysk.hdl.video.vertex_unit import VertexUnit, matrix_shape
 __all__ = ["STATUS", "DrawUnit", "band_shape", "drawn_band_pixel_shape"]
 
 STATUS = (*COUNTERS, *RENDERED, "frames", "bands", "busy")
-"""Counters of `DrawUnit`: of the assembly and of the renderer; begun frames and bands; busy cycles."""
+"""Counters of `DrawUnit`: those of assembly and renderer, then begun frames, begun bands, busy cycles."""
 
 
 def band_shape(bands: int):
@@ -44,14 +44,14 @@ def drawn_band_pixel_shape(x_bits: int, y_bits: int) -> data.StructLayout:
 class DrawUnit(wiring.Component):
     """Draws bands on request. `Drawing` is the bit-accurate model.
 
-    A band begins a frame if its index is at most the index of the band before. Then the controls move on, the
-    vertices of all meshes are transformed, and the constants are written. After this, or at once in other
-    bands, the list's triangles are read, and the triangles in the band are drawn. When the last pixel has
-    left, ``done`` gives the band's index. Then the depths are cleared, before the next request is accepted.
+    A band begins a frame if its index is at most the index of the band before. Then the controls take a step,
+    the vertices of all meshes are transformed, and the constants are written. In each band the triangles of
+    the command list are read, and triangles in the band are drawn. When the last pixel has left, ``done``
+    gives the band's index. Then the depths are cleared, before the next request is accepted.
 
-    Beside the renderer's cycles a frame takes
+    A frame takes the renderer's cycles, and these cycles:
 
-    - three cycles for each triangle in each band;
+    - 3 for each triangle in each band;
     - 30 for each vertex;
     - 150 for each mesh;
     - `BandDepth.swept` for each band, if the next band is requested at once.
@@ -98,7 +98,7 @@ class DrawUnit(wiring.Component):
         )
 
     def elaborate(self, platform):
-        """The units, and the commands, which use the units one after the other."""
+        """The units, and the logic that executes the commands."""
         m = Module()
         for name in ("render", "depth", "mesh", "commands", "vertex", "assembly", "motion", "controls"):
             m.submodules[name] = getattr(self, name)
@@ -132,7 +132,7 @@ class DrawUnit(wiring.Component):
     def _band(self, m: Module) -> None:
         """Draw one band after the other."""
         given, commands = self.model, self.commands
-        # A register follows, because a word of the memory comes late in its cycle.
+        # A register follows the memory, because its word comes late in the cycle.
         self._command_in = stream.Signature(commands.o.payload.shape()).create(path=("command",))
         connect_register(m, "waiting_command", commands.o, self._command_in)
         command = self._command_in.payload
@@ -232,7 +232,7 @@ class DrawUnit(wiring.Component):
                 ]
         with m.State("turn"):
             m.d.sync += left.eq(command.payload.count)
-            # The motion unit waits again when its last entry was taken.
+            # When its last entry was taken, the motion unit waits for the next slot.
             with m.If(self.motion.i.ready):
                 m.next = "read"
         with m.State("read"):
