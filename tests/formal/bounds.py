@@ -1,4 +1,4 @@
-"""Codes of which only bounds are known, for the bit-accurate models; and where hardware wraps and cuts."""
+"""Run bit-accurate models on bounds of codes, and find where hardware wraps and cuts bits."""
 
 import inspect
 from collections.abc import Iterator
@@ -17,22 +17,23 @@ __all__ = ["Bounds", "cut_by", "registers_of", "unknown", "word", "wrapped_by"]
 
 @dataclass(frozen=True, eq=False)
 class Unknown:
-    """A number of which all that is known is that it lies between two others."""
+    """A number between two known ends. Nothing else is known of it."""
 
     low: float
     high: float
 
 
 class Bounds:
-    """An array of integers, known by two enclosures at once; either may be the tighter one.
+    """An array of integers, enclosed in two ways at once; either enclosure may be the tighter.
 
-    One is an interval. The other is a sum of `Unknown` numbers times factors, and of a rest between two
-    numbers: ``N_r - N_l - G`` and ``t (1 - t) G`` stay what they are, whatever order a model adds them in. A
-    product of two such sums starts anew from its interval. Shifts to the right leave what they cut to the
-    rest.
+    The first enclosure is an interval. The second is a sum: `Unknown` numbers times factors, plus a rest in
+    an interval. In a sum such as ``N_r - N_l - G`` or ``t (1 - t) G`` a number that occurs twice keeps its
+    identity, whatever order a model adds in. A product of two sums of this kind has only the interval. A
+    shift to the right adds the cut bits to the rest.
 
-    Arithmetic is in float64, which is exact for integers under 2^53; larger ones are moved outwards. Factors
-    of about 1, of numbers to 2^46, are off by far less than the sixteenth by which a sum's ends are moved.
+    Arithmetic is in float64, which is exact for integers under 2^53; the ends of larger integers are moved
+    outwards. Factors are about 1 and numbers are under 2^46. So rounding of a factor counts far less than the
+    sixteenth by which the ends of a sum are moved.
 
     Parameters
     ----------
@@ -54,17 +55,17 @@ class Bounds:
                 for x, f in self.parts.items()
             ]
             least, most = (sum(end[k] for end in ends) + self.rest[k] for k in range(2))
-            # Outwards, then to the next whole number inwards: codes are whole numbers.
+            # Outwards, then inwards to a whole number, because codes are whole numbers.
             pad = 2.0**-4 + 2.0**-48 * (np.abs(least) + np.abs(most))
             low, high = np.maximum(low, np.ceil(least - pad)), np.minimum(high, np.floor(most + pad))
-        # Neither enclosure rounds inwards: over 2^53 a step of float64 is added.
+        # From 2^53 on a step of float64 is added, so that no end is rounded inwards.
         self.low = np.where(np.abs(low) < 2.0**53, low, np.nextafter(low, -np.inf))
         self.high = np.where(np.abs(high) < 2.0**53, high, np.nextafter(high, np.inf))
         assert (self.low <= self.high).all(), "no number is within both enclosures"
 
     @classmethod
     def of(cls, codes) -> "Bounds":
-        """Known codes."""
+        """Codes that are known exactly."""
         return codes if isinstance(codes, Bounds) else cls(codes, codes)
 
     @property
@@ -75,7 +76,7 @@ class Bounds:
         return self.shape[0]
 
     def _each(self, function) -> "Bounds":
-        """The same wiring of every array."""
+        """The result of a function that only rearranges elements, applied to every array."""
         arrays = (self.low, self.high, *self.rest, *self.parts.values())
         low, high, *others = (function(np.broadcast_to(array, self.shape)) for array in arrays)
         return Bounds(low, high, dict(zip(self.parts, others[2:], strict=True)), tuple(others[:2]))
@@ -87,15 +88,15 @@ class Bounds:
         return Bounds(self.low.any(axis=axis), self.high.any(axis=axis))
 
     def within(self, low, high) -> bool:
-        """Whether no code can be outside of a range."""
+        """Whether every code is in a range."""
         return bool((self.low >= low).all() and (self.high <= high).all())
 
     def known(self, low, high) -> "Bounds":
-        """The same code, of which it is known besides that it is in a range."""
+        """The same code, with the additional knowledge that it is in a range."""
         return Bounds(np.maximum(self.low, low), np.minimum(self.high, high), self.parts, self.rest)
 
     def clip(self, low, high) -> "Bounds":
-        """A code that is in range stays what it is."""
+        """The code, limited to a range. A code that is in the range keeps its parts."""
         if self.within(low, high):
             return self
         return Bounds(np.clip(self.low, low, high), np.clip(self.high, low, high))
@@ -114,7 +115,7 @@ class Bounds:
             low, high = np.minimum.reduce(ends), np.maximum.reduce(ends)
             if other.parts or not self.parts:
                 return Bounds(low, high)
-            # By the middle of the other, and by what is left of it.
+            # The middle of the other factor, plus the deviation from its middle.
             middle, left = (other.low + other.high) / 2, (other.high - other.low) / 2
             linear, rest = self * middle, left * np.maximum(np.abs(self.low), np.abs(self.high))
             return Bounds(low, high, linear.parts, (linear.rest[0] - rest, linear.rest[1] + rest))
@@ -143,7 +144,7 @@ class Bounds:
         return Bounds(low, high, parts, (self.rest[0] * scale - (1 - scale), self.rest[1] * scale))
 
     def __and__(self, mask):
-        """The low bits."""
+        """The low bits of the code."""
         assert mask & (mask + 1) == 0, "a mask has ones below and none above"
         return self if self.within(0, mask) else Bounds(np.zeros(self.shape), np.full(self.shape, mask))
 
@@ -171,7 +172,7 @@ class Bounds:
         return -self + other
 
     def __array_ufunc__(self, ufunc, method, *inputs, **_):
-        """An array on the left; and NumPy's functions by name."""
+        """Operations with an array on the left, and NumPy's functions."""
         operations = {
             np.add: lambda a, b: Bounds.of(a) + b,
             np.subtract: lambda a, b: Bounds.of(a) - b,
@@ -188,25 +189,25 @@ class Bounds:
 
 
 def unknown(low, high, reach=1.0) -> Bounds:
-    """A code of which nothing else is known, times ``reach``, an array of shape (..., 1)."""
+    """A code with unknown value in an interval, times ``reach``, an array of shape (..., 1)."""
     reach = np.atleast_2d(reach)
     return Bounds(low * reach, high * reach, {Unknown(low, high): reach}, (np.zeros_like(reach),) * 2)
 
 
 def word(format: Format, *shape: int) -> Fixed:
-    """Any code of a format, in each place."""
+    """Any code of a format, for each element."""
     return Fixed(format, Bounds(np.full(shape, format.min_code), np.full(shape, format.max_code)))
 
 
 def _fragments(part: Elaboratable) -> Iterator[Fragment]:
-    """A unit's hardware and that of all in it."""
+    """The hardware of a unit and of all units inside."""
     yield (fragment := Fragment.get(part, None))
     for inner, *_ in fragment.subfragments:
         yield from _fragments(inner)
 
 
 def wrapped_by(unit: Elaboratable) -> set[Format]:
-    """Formats to which a unit wraps, by `FixedValue.wrap`. What it cuts by raw slices: `cut_by`."""
+    """Formats to which a unit wraps by `FixedValue.wrap`. `cut_by` finds the cuts by raw slices."""
     found, wrap = set(), FixedValue.wrap
 
     def noted(value, format):
@@ -221,7 +222,7 @@ def wrapped_by(unit: Elaboratable) -> set[Format]:
 
 
 def _inner(value: Value) -> Value:
-    """What low bits are taken from, whatever their sign."""
+    """The value from which low bits are taken, without conversions of its sign."""
     if isinstance(value, Slice) and value.start == 0:
         return _inner(value.value)
     if isinstance(value, Operator) and value.operator in ("s", "u"):
@@ -230,10 +231,10 @@ def _inner(value: Value) -> Value:
 
 
 def cut_by(unit: Elaboratable) -> set[str]:
-    """Functions in which a unit's hardware cuts top bits of a sum, a product, a left shift or a choice.
+    """Functions in which a unit's hardware cuts upper bits of a sum, a product, a left shift or a choice.
 
-    By raw slices, not by operations of `FixedValue`. What is cut of a register, or by an assignment to a
-    shorter one, is not seen.
+    It finds raw slices, and no operations of `FixedValue`. It does not find cuts of a register, or cuts by an
+    assignment to a shorter signal.
     """
     found, make = set(), Slice.__init__
 
@@ -255,6 +256,6 @@ def cut_by(unit: Elaboratable) -> set[str]:
 
 
 def registers_of(unit: Elaboratable) -> list[Signal]:
-    """Registers of a unit and of all in it."""
+    """Registers of a unit and of all units inside."""
     statements = (x for fragment in _fragments(unit) for x in fragment.statements.get("sync", ()))
     return [signal for statement in statements for signal in statement._lhs_signals()]

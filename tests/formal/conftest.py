@@ -1,4 +1,4 @@
-"""What proofs share: a folder for the netlist, and verdicts that say what they found."""
+"""Fixtures of proofs: prove and refute claims of a harness, inject bugs, check wraps."""
 
 import inspect
 import textwrap
@@ -14,9 +14,10 @@ from .rules import never_resumes
 
 @pytest.fixture
 def prove(decided, tmp_path):
-    """Prove the claims of a harness, for runs of any length, or of so many cycles from power-up.
+    """Prove the claims of a harness, for runs of any length, or for some cycles from power-up.
 
-    So many must be enough for a beat to wait, another to come, and one to leave.
+    The number of cycles must be large enough. In this time a beat must be able to wait, a second beat to
+    come, and the first beat to leave.
     """
     if missing_tool():
         pytest.skip(missing_tool())
@@ -36,7 +37,7 @@ def prove(decided, tmp_path):
 
 @pytest.fixture
 def refute(decided, tmp_path):
-    """Find a counterexample to the claims of a harness, of at most so many cycles; the injected bug's."""
+    """Find a counterexample to the claims of a harness with an injected bug, within some cycles."""
     if missing_tool():
         pytest.skip(missing_tool())
 
@@ -49,7 +50,7 @@ def refute(decided, tmp_path):
 
 @pytest.fixture
 def inject(monkeypatch):
-    """Inject a bug: put a copy of a function in its place, in which one piece of text is another."""
+    """Inject a bug: replace a function by a copy in which a piece of text is changed."""
 
     def inject(owner, name, text, bug):
         function = getattr(owner, name)
@@ -64,9 +65,9 @@ def inject(monkeypatch):
 
 @pytest.fixture
 def wraps(monkeypatch):
-    """Formats in which a model wraps or makes words; it fails where one may not hold a code.
+    """Formats in which a model wraps or makes words. The fixture fails if a format may not hold a code.
 
-    All other operations have results of formats that hold whatever there is, or saturate.
+    The results of all other operations have formats that hold every result, or saturate.
     """
     found, wrap, new = [], Format.wrap, Fixed.__init__
 

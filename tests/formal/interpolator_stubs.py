@@ -1,4 +1,4 @@
-"""Short units of few bits in the place of the parts of interpolators, and the words that they hand on."""
+"""Stubs for the parts of interpolators: short units, which pass on words of few bits."""
 
 from amaranth.hdl import Cat, Const, Fragment, Signal, Value
 
@@ -28,7 +28,7 @@ from blysk.hdl.normals.quadratic_evaluator import QuadraticEvaluatorUnit
 
 from .stubs import short, short_wave
 
-# Spans of 0 to 3 pixels, and the cycles from one to the next that setups are built for.
+# Spans have 0 to 3 pixels. Setups are built for this interval.
 LENGTH_BITS, INTERVAL = 2, 2
 TAG_BITS = 2
 WORD_BITS = LENGTH_BITS + TAG_BITS
@@ -36,22 +36,22 @@ NARROW = DifferenceAccumulator(SQ(1, WORD_BITS), SQ(2, WORD_BITS + 1), SQ(2, WOR
 
 
 def word(number: FixedValue) -> Value:
-    """Of a pixel: its place in its span, and the tag of the span."""
+    """The word of a pixel: its position in its span, and the tag of the span."""
     return Value.cast(number)[:WORD_BITS]
 
 
 def tag(number: FixedValue) -> Value:
-    """Of a span."""
+    """The tag of a span, from the word of a pixel."""
     return word(number)[LENGTH_BITS:]
 
 
 def first_word(number: FixedValue, place: int = 0) -> Value:
-    """Of the pixel at a place of the span."""
+    """The word of the pixel at a position of the span."""
     return Cat(Const(place, LENGTH_BITS), tag(number))
 
 
 def put(number: FixedValue, code: Value):
-    """Assign a code."""
+    """Assign a code to a number."""
     return Value.cast(number).eq(code)
 
 
@@ -169,7 +169,7 @@ def angle(theta, cos_beta):
 
 
 def loop(self, m, name, start, starts, *others):
-    """In place of the recurrence unit's: of each of a span's first four pixels the value that was given."""
+    """A stub for the recurrence unit. It gives each of a span's first four pixels the value from the span."""
     x = Signal(WORD_BITS, name=name)
     with m.If(starts):
         m.d.sync += x.eq(word(start[0]))
@@ -178,7 +178,7 @@ def loop(self, m, name, start, starts, *others):
 
 
 def walk(find, place):
-    """In place of an accumulator's quadratics: one of few bits, from a span's word by one a pixel."""
+    """A stub for an accumulator of quadratics. It adds 1 to a word of few bits at each pixel of a span."""
 
     def quadratics(self, values):
         one, none = (
@@ -192,19 +192,19 @@ def walk(find, place):
 
 
 class Line(AccumulatorUnit):
-    """In place of a unit that takes spans to normals: an accumulator of its streams."""
+    """A stub for a unit that takes spans and gives normals: an accumulator with the streams of this unit."""
 
     cycles_per_pixel = 1
 
     def __init__(self, model):
         unit = self.OF(model)
-        # Else its parts count as forgotten.
+        # Otherwise the proof would not use the parts of this unit.
         Fragment.get(unit, None)
         super().__init__(unit.i.payload.shape(), unit.o.payload.shape())
 
 
 class Normaliser(Line):
-    """Of a span that is not divided; the unit itself takes 63 cycles to its first pixel."""
+    """A stub for a span that is not divided. The real unit takes 63 cycles to the first pixel of a span."""
 
     OF = AdaptiveNormaliserUnit
     quadratics = walk(left, lambda values: values.normal[0])
@@ -217,14 +217,14 @@ class Normaliser(Line):
 
 
 class Evaluator(Line):
-    """Of either form."""
+    """A stub for both forms of the evaluator."""
 
     OF = QuadraticEvaluatorUnit
     quadratics = walk(constant_coefficient, normal)
 
 
 class Vectors(Line):
-    """Its setup is proved by itself."""
+    """Another file proves the setup of this unit."""
 
     initiation_interval = INTERVAL
     quadratics = walk(vector_start, vector_line)
@@ -236,13 +236,16 @@ class Vectors(Line):
 
 
 def replace_parts(monkeypatch) -> None:
-    """Put units of 2 or 3 cycles, and accumulators of few bits, in the place of parts: they hand words on."""
+    """Replace parts of interpolators by short units and accumulators of few bits.
+
+    The units take 2 or 3 cycles. All parts pass on words.
+    """
     for module, name, hand_on, latency in (
         (blysk.hdl.methods.interpolator, "LightProductsUnit", products, 2),
         (blysk.hdl.methods.linear_interpolator, "DifferenceSetupUnit", difference_setup, 3),
         (blysk.hdl.methods.renormalise_interpolator, "LineSetupUnit", line_setup, 3),
         (blysk.hdl.methods.renormalise_interpolator, "RenormaliserUnit", renormaliser, 2),
-        # A length takes three cycles round these two.
+        # The length of a span takes three cycles beside these two units.
         (blysk.hdl.methods.quadratic_interpolator, "MiddleNormalUnit", middle_normal, 3),
         (blysk.hdl.methods.quadratic_interpolator, "GPQUnit", coefficients, 1),
         (blysk.hdl.methods.quadratic_interpolator, "DifferenceSetupUnit", difference_setup, 3),
@@ -252,7 +255,8 @@ def replace_parts(monkeypatch) -> None:
         (blysk.hdl.methods.quotient_interpolator, "QuotientUnit", quotients, 3),
     ):
         monkeypatch.setattr(module, name, short(getattr(module, name), hand_on, latency))
-    # Of the same capacity and latency, by the same claims of a stream: proofs of a wide memory take long.
+    # This FIFO has the same capacity and latency, and other proofs show the same claims of a stream. Proofs
+    # with a wide memory take long.
     for module in ("linear", "quadratic", "renormalise"):
         monkeypatch.setattr(
             f"blysk.hdl.methods.{module}_interpolator.connect_wide_fifo",

@@ -1,4 +1,4 @@
-"""Proofs of hardware: what is claimed of a unit for all inputs, decided by Yosys and ABC (package pyosys)."""
+"""Proofs of hardware: Yosys and ABC decide claims about a unit for all inputs (package pyosys)."""
 
 import re
 import subprocess
@@ -19,7 +19,7 @@ __all__ = ["Harness", "Verdict", "decide", "expect", "missing_tool"]
 
 _YOSYS = "import sys, pyosys.libyosys as y; d = y.Design(); [d.run_pass(l.strip()) for l in sys.stdin]"
 
-# Cut are products and tables: what holds whatever they give holds for what they do give.
+# Products and tables are cut off. A claim that holds for all of their results holds for their true results.
 _SCRIPT = """\
 read_rtlil top.il
 hierarchy -auto-top
@@ -45,15 +45,17 @@ write_aiger -zinit -symbols top.aig
 """
 
 _SECONDS = 600
-"""After which a proof is given up."""
+"""Seconds after which a proof is given up."""
 
 
 class Harness:
-    """A unit whose inputs are free, on every cycle, and what is claimed of it.
+    """A unit with free inputs in every cycle, and the claims about it.
 
-    All input members, ``rst`` too, may take any value on any clock: a claim holds for every stimulus, and
-    with a reset at any time. Registers of `m` are reset with the unit. Multipliers and tables without a write
-    port give anything on every cycle: claims that hold so hold for the unit, but not the other way round.
+    All members of the input, and ``rst``, may take any value in any cycle. So a claim holds for every
+    stimulus, and with a reset at any time. Registers of `m` are reset with the unit.
+
+    Multipliers, and tables without a write port, give any result in every cycle. A claim that is proved in
+    this way holds for the unit. A claim that is refuted in this way may still hold.
 
     Parameters
     ----------
@@ -80,13 +82,13 @@ class Harness:
             ]
 
     def free(self, shape: ShapeLike = 1, name: str = "free") -> Signal:
-        """A signal that takes any value on every cycle."""
+        """A signal that takes any value in every cycle."""
         signal = Signal(shape, name=name)
         self._ports.append(Value.cast(signal))
         return signal
 
     def register(self, name: str) -> Signal:
-        """The unit's own register of a name, not those of its submodules.
+        """The register of a name in the unit itself. Registers of submodules do not count.
 
         Raises
         ------
@@ -101,31 +103,31 @@ class Harness:
         return named.popitem()[1]
 
     def claim(self, condition: ValueLike) -> None:
-        """Claim that a condition holds on every cycle."""
+        """Claim that a condition holds in every cycle."""
         self._claims.append(Value.cast(condition))
 
     def assume(self, condition: ValueLike) -> None:
-        """Leave out the runs in which a condition does not hold on every cycle."""
+        """Consider only runs in which a condition holds in every cycle."""
         self.m.d.comb += Assume(condition)
 
     def without_claims(self) -> "Harness":
-        """The same runs, of which nothing is claimed yet."""
+        """A harness with the same runs and without claims."""
         other = Harness(multiplies=self.multiplies)
         other.m.submodules.runs, other.unit, other._ports = self.m, self.unit, self._ports
         return other
 
     def netlist(self) -> str:
-        """RTLIL text."""
+        """The harness as RTLIL text."""
         top = Module()
         top.submodules.runs = self.m
         top.d.comb += [Assert(condition) for condition in self._claims]
-        # A copy, as what is converted cannot be used again.
+        # A copy, because a fragment that was converted cannot be used again.
         return rtlil.convert(DomainRenamer({})(Fragment.get(top, None)), ports=self._ports)
 
 
 @dataclass(frozen=True)
 class Verdict:
-    """What became of the claims.
+    """The verdict on the claims.
 
     Parameters
     ----------
@@ -143,7 +145,7 @@ class Verdict:
 
 
 def missing_tool() -> str:
-    """Why nothing can be proved here; empty if it can."""
+    """The reason why nothing can be proved on this machine; empty if proofs are possible."""
     return "" if find_spec("pyosys") else f"pyosys is not installed: {install_extra('fpga')}"
 
 
@@ -158,10 +160,10 @@ def _run_yosys(script: str, folder: Path) -> None:
 def expect(
     holds: bool, harness: Harness, folder: Path, cycles: int | None = None, *, decided: Decided
 ) -> Verdict:
-    """The expected verdict if it was found before, otherwise that of `decide`.
+    """The expected verdict if `decided` has it, otherwise the verdict of `decide`.
 
-    What it depends on: the netlist with its claims, but for the places in the source, the commands of Yosys
-    and ABC with the number of cycles, and the expected verdict itself.
+    The digest of a verdict covers the netlist with its claims, without places in the source. It also covers
+    the commands of Yosys and ABC with the number of cycles, and the expected verdict.
     """
     netlist = harness.netlist()
     text = re.sub(r"^ *attribute \\src .*\n", "", netlist, flags=re.MULTILINE)
@@ -175,7 +177,7 @@ def expect(
 
 
 def _commands(cycles: int | None, multiplies: bool) -> tuple[str, str]:
-    """What Yosys and ABC do."""
+    """The commands of Yosys and ABC."""
     cut = "t:$mem_v2 r:WR_PORTS=0 %i" + ("" if multiplies else " t:$mul %u")
     engine = f"lcorr; pdr -T {_SECONDS}" if cycles is None else f"bmc3 -F {cycles} -T {_SECONDS}"
     return (
@@ -223,7 +225,7 @@ def decide(netlist: str, folder: Path, cycles: int | None = None, multiplies: bo
 
 
 def _trace(path: Path) -> str:
-    """Inputs of a counterexample: for each clock the names of the bits that are 1."""
+    """Inputs of a counterexample: for each cycle the names of the bits that are 1."""
     cycles: dict[int, list[str]] = {}
     for name, clock, bit in re.findall(r"^(\S+)@(\d+)=([01])$", path.read_text(), re.MULTILINE):
         cycles.setdefault(int(clock), []).extend([name] if bit == "1" else [])

@@ -1,4 +1,4 @@
-"""What is claimed of streams: what waits stays, and nothing is lost, invented, out of order or stuck."""
+"""Claims about streams: a beat that waits does not change, and beats keep their order and number."""
 
 from collections.abc import Callable
 
@@ -11,12 +11,12 @@ __all__ = ["answers", "follows", "never_resumes", "pixels_follow", "stays", "tak
 
 
 def taken(channel: stream.Interface) -> Value:
-    """Whether a beat goes over on this cycle."""
+    """Whether a beat is transferred in this cycle."""
     return channel.valid & channel.ready
 
 
 def stays(harness: Harness, channel: stream.Interface) -> Signal:
-    """Claim that a beat once offered stays as it is until it is taken; the result: whether one waits."""
+    """Claim that an offered beat does not change until it is taken. The result tells whether a beat waits."""
     waits, payload = Signal(name="waits"), Value.cast(channel.payload).as_unsigned()
     before = Signal(len(payload), name="before")
     harness.m.d.sync += [waits.eq(channel.valid & ~channel.ready), before.eq(payload)]
@@ -25,9 +25,10 @@ def stays(harness: Harness, channel: stream.Interface) -> Signal:
 
 
 def never_resumes(harness: Harness) -> None:
-    """Claim that of the harness's unit no beat leaves once one has waited and another come: to be refuted.
+    """Claim that no beat leaves after one beat has waited and another has come. This claim is to be refuted.
 
-    If that holds for so many cycles, a proof of so many has seen no beat lost, or dropped, that waited.
+    If the claim held for the cycles of a proof, the proof would be empty: in its runs no beat that waited
+    could leave, be lost or be dropped.
     """
     unit, waited, came = harness.unit, Signal(name="waited"), Signal(name="came")
     harness.m.d.sync += [
@@ -38,7 +39,10 @@ def never_resumes(harness: Harness) -> None:
 
 
 def answers(harness: Harness, due: Value, answer: Value, cycles: int, when: Value) -> None:
-    """Claim that what is due fails to come on at most so many cycles in a row, all of them ``when``."""
+    """Claim that an answer that is due is missing in at most some cycles in a row.
+
+    Only cycles with ``when`` count.
+    """
     missed = Signal(range(cycles + 2), name="missed")
     harness.m.d.sync += missed.eq(Mux(due & ~answer & when & (missed <= cycles), missed + 1, 0))
     harness.claim(missed <= cycles)
@@ -51,10 +55,11 @@ def follows(
     capacity: int,
     image: Callable[[Value, Value], Value] | None = None,
 ) -> Signal:
-    """Claim that beats leave in order, each once, none that has not come, and at most so many are inside.
+    """Claim that beats leave in order and once each, that no other beat leaves, and that few are inside.
 
-    A counter holds how many are inside. Of any one beat, which a free input chooses, the model knows how many
-    are ahead; when these have left, the next that leaves must be its image.
+    A counter holds the number of beats inside. A free input chooses any beat. For this beat the model knows
+    how many beats are ahead of it. When these have left, the next beat that leaves must be the image of the
+    chosen beat.
 
     Parameters
     ----------
@@ -85,7 +90,7 @@ def follows(
         with m.If(~watched), m.If(comes & chosen):
             m.d.sync += [watched.eq(1), ahead.eq(inside - leaves), payload.eq(source.payload)]
         with m.Elif(leaves):
-            # Once it has left, another may be chosen.
+            # After the chosen beat has left, another may be chosen.
             m.d.sync += [ahead.eq(ahead - 1), watched.eq(ahead != 0)]
         of_kind = source.payload.shape()
         came = of_kind(payload) if callable(of_kind) else payload
@@ -102,7 +107,9 @@ def pixels_follow(
     capacity: int,
     image: Callable[[Value, Value, Value, Value], Value] | None = None,
 ) -> Signal:
-    """Claim that spans leave as their pixels, in order: `follows` for units with a beat for each pixel.
+    """Claim that the pixels of spans leave in order.
+
+    It is `follows` for units with an output beat for each pixel.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""Short stubs for proven units, so that what is made of them can be proved."""
+"""Short stubs for units that are proved elsewhere, for proofs of larger units."""
 
 from collections.abc import Callable, Iterable
 
@@ -15,9 +15,10 @@ def short(
     latency: int = 2,
     initiation_interval: int | None = None,
 ) -> type[PipelinedUnit]:
-    """A class with a unit's streams and control, a latency of its own, and a data path that hands bits on.
+    """A class with the streams and control of a unit, another latency, and a data path that passes bits on.
 
-    `test_units` proves of every `PipelinedUnit` that beats leave in order, each once, ``latency`` cycles on.
+    `test_units` proves for every `PipelinedUnit` that beats leave in order and once each, ``latency`` cycles
+    later.
 
     Parameters
     ----------
@@ -50,7 +51,7 @@ def short(
 
 
 def short_wave(hand_on: Callable[[Value, Value], Value]) -> Callable:
-    """In place of stages 2 on of the highlight-cosine unit, up to its latency: registers for a code.
+    """A stub for stages 2 to the last of the highlight-cosine unit: registers for a code.
 
     Parameters
     ----------

@@ -1,12 +1,14 @@
 # amaranth: UnusedElaboratable=no
-"""Proofs of the adaptive normaliser: its segments have the pixels of their span, and each pixel leaves once.
+"""Proofs of the adaptive normaliser: segments have the pixels of their span, and each pixel leaves once.
 
-Between its second part and its third is a queue of segments, `amaranth.lib.fifo.SyncFIFOBuffered`, which
-hands on what it takes. In its place is one that takes segments on any cycles and gives any: what is claimed
-on one side of it holds whatever the other does. Before it one span's levels are counted while the one
-before is divided. The bisection is a stand-in of 3 cycles whose results are free; products are, too, and
-thus the number of levels. Lengths have 3 bits, and a segment is prepared in 6 cycles instead of 14, of
-which the others are for its start and step.
+The unit has three parts. Between the second and the third part is a queue of segments,
+`amaranth.lib.fifo.SyncFIFOBuffered`. A stub replaces the queue: it takes and gives any segments in any
+cycles. So a claim on one side of the queue holds whatever the other side does. The first part counts the
+levels of a span while the second part divides the span before.
+
+The bisection is a stub of 3 cycles with free results. Products are free, too, and so is the number of levels.
+Lengths have 3 bits. A segment is prepared in 6 cycles in place of 14; the other cycles are for its start and
+step.
 """
 
 from types import SimpleNamespace
@@ -30,14 +32,14 @@ pytestmark = [pytest.mark.prove, pytest.mark.seldom]
 LENGTH_BITS = 3
 PROGRESS_CLOCKS = 25
 THRESHOLDS = {1: 1 / 8, 2: 1 / 16}
-"""By the levels that they lead to, at most."""
+"""Thresholds by the largest number of levels that they allow."""
 
 SEGMENT = data.StructLayout({"count": LENGTH_BITS, "last": 1, "out_of_range": 1})
-"""Upper bits of what goes through the queue."""
+"""Upper bits of a word of the queue."""
 
 
 class Queue(Elaboratable, FIFOInterface):
-    """Takes segments and gives others, each on any cycles: what it says is left open."""
+    """A queue with free behaviour: it takes and gives any segments in any cycles."""
 
     def elaborate(self, platform):
         return Module()
@@ -45,7 +47,7 @@ class Queue(Elaboratable, FIFOInterface):
 
 @pytest.fixture
 def harness(monkeypatch):
-    """A harness of the unit and its queue, for a threshold."""
+    """Make a harness of the unit and its queue, for a threshold."""
     queues = []
 
     def queue(width, depth):
@@ -73,7 +75,7 @@ def segment_of(port):
 
 
 def pixels_left(h, queue):
-    """Whether a segment is given, how many pixels of its span are to come, and the span that follows."""
+    """Whether a segment is given; the pixels left of its span; the length of the following span."""
     left, following = (Signal(LENGTH_BITS, name=name) for name in ("left", "following"))
     gives, came = queue.w_en & queue.w_rdy, Signal(LENGTH_BITS)
     h.m.d.comb += came.eq(Mux(taken(h.unit.i), h.unit.i.payload.length, 0))
@@ -88,12 +90,15 @@ def pixels_left(h, queue):
 
 
 def of_segments(h, queue):
-    """A span's segments have its pixels, one or more each; the last is marked; two spans are in at most."""
+    """Claim that a span's segments have its pixels, and at least one pixel each.
+
+    The last segment is marked, and at most two spans are inside.
+    """
     segment, (gives, left, following) = segment_of(queue.w_data), pixels_left(h, queue)
     h.claim(~queue.w_en | (segment.count.any() & (segment.count <= left)))
     h.claim(~queue.w_en | (segment.last == (segment.count == left)))
     h.claim(~(taken(h.unit.i) & following.any()))
-    # The queue has room for all of a span's.
+    # The queue has room for all segments of a span.
     count = Signal(range(queue.depth + 2))
     h.m.d.sync += count.eq(Mux(gives & segment.last, 0, count + gives))
     h.claim(count <= queue.depth)
@@ -101,7 +106,7 @@ def of_segments(h, queue):
 
 
 def of_progress(h, queue):
-    """A segment comes in so many cycles; a span is taken when there are no more."""
+    """Claim that segments come in time, and that a span is taken when no segments are left."""
     gives, left, following = pixels_left(h, queue)
     answers(h, left.any(), gives, PROGRESS_CLOCKS, queue.w_rdy)
     answers(h, h.unit.i.valid & ~left.any() & ~following.any(), h.unit.i.ready, 1, 1)
@@ -109,7 +114,7 @@ def of_progress(h, queue):
 
 
 def of_pixels(h, queue):
-    """A segment of n pixels, n over 0, has n, in order; the last of a span is marked."""
+    """Claim that a segment of n pixels gives n pixels in order, and that a span's last pixel is marked."""
     before, stood = Signal.like(queue.r_data), Signal()
     h.m.d.sync += [before.eq(queue.r_data), stood.eq(queue.r_rdy & ~queue.r_en)]
     h.assume(~stood | (queue.r_rdy & (queue.r_data == before)))
@@ -123,7 +128,7 @@ def of_pixels(h, queue):
     stays(h, h.unit.o)
     owed = pixels_follow(h, source, h.unit.o, segment.count, 2 * ((1 << LENGTH_BITS) - 1) + 2, image)
     answers(h, owed.any(), taken(h.unit.o), 1, h.unit.o.ready)
-    # Spans that are in the queue with all of their segments.
+    # Number of spans with all of their segments in the queue.
     inside, spans = Signal(), Signal(range(queue.depth + 2))
     completes = queue.w_en & queue.w_rdy & segment_of(queue.w_data).last
     h.m.d.sync += spans.eq(spans + completes - (taken(source) & ~inside))
@@ -138,20 +143,20 @@ def of_pixels(h, queue):
 
 @pytest.mark.parametrize("levels", THRESHOLDS)
 def test_segments(prove, harness, levels):
-    """Inductive, up to so many levels: the claims on segments; the queue has room for all of a span."""
+    """By induction, up to a number of levels: the claims on segments."""
     prove(of_segments(*harness(THRESHOLDS[levels])))
 
 
 def test_progress(prove, harness):
-    """Inductive, up to one level: while the queue takes them, segments come 25 cycles apart at most."""
+    """By induction, up to one level: if the queue takes segments, they come at most 25 cycles apart."""
     prove(of_progress(*harness(THRESHOLDS[1])))
 
 
 def test_pixels(prove, harness):
-    """Inductive: what waits stays; pixels come in order, one a clock; a segment follows the one before.
+    """By induction: pixels come in order, one in each cycle, and a segment follows the segment before.
 
-    It does as soon as all segments of its span have come. As these go through the queue one after the other,
-    a span's pixels leave in order.
+    A segment follows as soon as all segments of its span have come. Segments pass the queue in order, so a
+    span's pixels leave in order.
     """
     prove(of_pixels(*harness(THRESHOLDS[1])))
 
@@ -171,7 +176,7 @@ BUGS = {
 
 @pytest.mark.parametrize("bug", BUGS)
 def test_bugs_are_found(refute, inject, harness, bug):
-    """Injected in the unit, each refutes a claim."""
+    """Each bug, injected in the unit, refutes a claim."""
     claims, *change = BUGS[bug]
     inject(AdaptiveNormaliserUnit, *change)
     refute(claims(*harness(THRESHOLDS[1])))

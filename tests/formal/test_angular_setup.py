@@ -1,4 +1,4 @@
-"""Proof that no word of the angular setup wraps but angles, which count turns and wrap as they must."""
+"""Proof that no word of the angular setup wraps, except angles. Angles count turns and have to wrap."""
 
 from fnmatch import fnmatchcase
 
@@ -27,7 +27,7 @@ from .prover import Harness
 pytestmark = [pytest.mark.prove, pytest.mark.seldom]
 
 LONGEST = 1.01 * ONE
-"""Largest length of vectors, in codes; that of unit vectors is off by under 0.001 %."""
+"""Largest length of vectors, in codes. Unit vectors are longer than `ONE` by less than 0.001 %."""
 
 WIDEST = 2 * LONGEST**2
 """Largest w: the squared distance of N_l to N_r or to -N_r, whichever is nearer."""
@@ -37,7 +37,7 @@ TURNS = (AngularSetup.DIRECTION_FORMAT, AngularSetup.PHASE_FORMAT)
 
 @pytest.fixture(autouse=True)
 def but_turns(wraps, monkeypatch):
-    """Formats as of `wraps`, of which those of angles may wrap."""
+    """Formats as of `wraps`, where formats of angles may wrap."""
     checked = Format.wrap
 
     def wrap(format, codes):
@@ -55,17 +55,20 @@ def pieces(codes):
 
 
 def largest_major(chord):
-    """``|N_l + N_r|^2 + |N_l - N_r|^2`` is twice the sum of both squares; w is one of them, exactly."""
+    """Bound of the operand with the other square, from w, which is one of the two squares.
+
+    ``|N_l + N_r|^2 + |N_l - N_r|^2`` is exactly twice the sum of both squared lengths.
+    """
     return np.sqrt(np.maximum(2 * WIDEST - chord, 0)) * LONGEST
 
 
 def largest_minor(chord):
-    """The other operand is a product of H and the vector whose square is w."""
+    """Bound of the other operand. It is a product of H and the vector whose square is w."""
     return np.sqrt(chord) * LONGEST
 
 
 def of_major():
-    """Every word of w that addresses the table, with the smallest w of that word."""
+    """Check every word of w that addresses the table, with the smallest w of that word."""
     unit = AngularSetup()
     unread = 35 - unit.ADDRESS_BITS - unit.FRACTION_BITS
     for chord in pieces(np.arange(0, int(WIDEST), 1 << unread)):
@@ -74,9 +77,9 @@ def of_major():
 
 
 def of_minor():
-    """Every word of v that addresses the table, with the end of that word for w.
+    """Check every word of v that addresses the table, with the largest w of that word.
 
-    ``v = z 4^j`` and ``minor 2^j`` are all that is read, and neither has another bound for another j: 1 here.
+    The unit reads only ``v = z 4^j`` and ``minor 2^j``. Their bounds do not depend on j, so j is 1 here.
     """
     unit = AngularSetup()
     unread = 34 - unit.ADDRESS_BITS - unit.FRACTION_BITS
@@ -86,9 +89,9 @@ def of_minor():
 
 
 def of_shift():
-    """The ends of what has a shift; and psi of w beyond 2, which vectors of unit length do not reach.
+    """Check the ends of each shift, and psi for w beyond 2.
 
-    To 2 `test_widths` has the half chord.
+    Vectors of unit length have w up to 2, which `test_widths` checks in the half chord.
     """
     for j in range(18):
         chord = np.array([1 << 34 - 2 * j, (1 << 36 - 2 * j) - 1])
@@ -100,17 +103,17 @@ def of_shift():
 
 
 def of_rotation():
-    """Any two words of x and y: a bound of both after CORDIC's steps, whichever way each turns.
+    """Check any two words of x and y: a bound of both after all CORDIC steps, whichever way each step turns.
 
-    A step is a turn, times ``sqrt(1 + 4^-i)``, and the cuts of two shifts; which is read off the model's
-    sums. So the length of (x, y) grows by that factor, and by that of (1, 1) at most.
+    A step is a turn, times ``sqrt(1 + 4^-i)``, and the cuts of two shifts; this is read off the model's sums.
+    So a step makes the length of (x, y) larger by at most that factor and the length of (1, 1).
     """
     unit, pairs, unknowns = AngularSetup(), [], []
 
     def either(_, a, b):
-        """In place of `numpy.where`."""
+        """Replacement of `numpy.where`."""
         if not (isinstance(a, Bounds) and a.parts):
-            # The direction.
+            # This choice is for the direction.
             a, b = Bounds.of(a), Bounds.of(b)
             return Bounds(np.minimum(a.low, b.low), np.maximum(a.high, b.high))
         pairs.append((a, b))
@@ -125,7 +128,7 @@ def of_rotation():
     unknowns = [*first, *unknowns]
     largest = -np.sqrt(2) * unit.AXIS_FORMAT.min_code
     for k in range(unit.CORDIC_STEPS + 1):
-        # First the half turn of those behind.
+        # The first step is the half turn of vectors that point backwards.
         growth = 1 + 4.0 ** (1 - k) if k else 1
         before = [next(iter(number.parts)) for number in unknowns[2 * k : 2 * k + 2]]
         for sums in zip(*pairs[2 * k : 2 * k + 2], strict=True):
@@ -140,7 +143,7 @@ def of_rotation():
 
 
 def of_results(monkeypatch, largest):
-    """What takes back the gain, for any x up to that; and its terms, in whatever order they are added."""
+    """Check the product that removes the gain, for any x up to its bound, and its terms in any order."""
     unit = AngularSetup()
     x = unknown(-largest, largest)[:, 0]
     monkeypatch.setattr(AngularSetup, "_polar", lambda *_: (x, word(unit.DIRECTION_FORMAT, 1)))
@@ -150,12 +153,12 @@ def of_results(monkeypatch, largest):
 
 
 def of_step():
-    """The largest psi of every shift, and every length."""
+    """Check the largest psi of every shift, and every length."""
     unit = AngularSetup()
     length = np.arange(1, 1 << LENGTH_BITS)
     _, halvings = reciprocal_address(length - 1)
     for shift in range(18):
-        # Of the half chord. By arccos, and beyond 90 degrees, nothing is shifted.
+        # Only psi of the half chord is shifted. By arccos, and beyond 90 degrees, psi is not shifted.
         most = HalfChord.ROOT_FORMAT.max_code * HalfChord.FACTOR_FORMAT.max_code << 1 >> shift
         psi = Bounds(0, most if shift else unit.ANGLE_FORMAT.max_code)
         Fixed(unit.ANGLE_FORMAT, psi << shift)
@@ -164,7 +167,10 @@ def of_step():
 
 
 def of_cosine(monkeypatch):
-    """Any code of the dot product, and of psi by arccos; that unit equals its model for every operand."""
+    """Check any code of the dot product, and of psi by arccos.
+
+    The arccos unit equals its model for every operand.
+    """
     dot = DotProduct().compute(word(COMPONENT, 1, 3), word(COMPONENT, 1, 3))
     for sign in (-1, 1):
         Fixed(SIZE_FORMAT, dot.codes * sign)
@@ -173,7 +179,7 @@ def of_cosine(monkeypatch):
 
 
 def of_adders():
-    """CORDIC's adder and its shifts, of any words: where the model's sum fits the format, it gives that."""
+    """Prove CORDIC's adder and shifts: if the model's sum fits the format, the hardware gives this sum."""
     h, format = Harness(), AngularSetup.ROTATED_FORMAT
     a, b = (Signal(signed(format.width), name=name) for name in "ab")
     h.m.d.sync += [a.eq(h.free(format.width, "any_a")), b.eq(h.free(format.width, "any_b"))]
@@ -187,7 +193,7 @@ def of_adders():
 
 
 def of_registers(angle):
-    """Raw slices of bits leave as many as the words have of which it is proved that they do not wrap."""
+    """Claim that raw slices leave as many bits as words have that are proved not to wrap."""
     registers = registers_of(AngularSetupUnit(AngularSetup(angle)))
     for name, format in (REGISTERS | REGISTERS_BY_ANGLE[angle]).items():
         widths = {len(register) for register in registers if fnmatchcase(register.name, name)}
@@ -219,7 +225,7 @@ CUTS_BY_ANGLE = {
         "blysk.hdl.cosines.arccos.ArccosUnit.datapath",
     },
 }
-"""Whose words are below; or in `test_widths`, of `reciprocal_words`; or those of the arccos unit."""
+"""Checks of this file cover these words, or `reciprocal_words` of `test_widths`, or the arccos unit."""
 
 REGISTERS = {
     "cross": SIZE_FORMAT,
@@ -250,9 +256,10 @@ REGISTERS_BY_ANGLE = {
 
 
 def test_no_word_wraps(monkeypatch, but_turns):
-    """Vectors of any length up to 1.01, any angle apart, to the pole at 180 degrees; 1 to 4095 pixels.
+    """No word wraps for vectors up to 1.01 long, at any angle up to 180 degrees, and 1 to 4095 pixels.
 
-    x and y by every word of w, CORDIC for any x and y; lambda and its direction count turns, and do wrap.
+    x and y are checked for every word of w, and CORDIC for any x and y. lambda and its direction count turns,
+    and wrap.
     """
     of_major()
     of_minor()
@@ -268,13 +275,13 @@ def test_no_word_wraps(monkeypatch, but_turns):
 
 @pytest.mark.parametrize("angle", SPAN_ANGLES)
 def test_registers_have_the_words_that_are_proved(angle):
-    """Where hardware cuts bits by slices: v, ``minor 2^j``, CORDIC and its gain, psi and its step."""
+    """The hardware cuts bits by slices only for v, ``minor 2^j``, CORDIC, its gain, psi and its step."""
     of_registers(angle)
     assert cut_by(AngularSetupUnit(AngularSetup(angle))) == CUTS | CUTS_BY_ANGLE[angle]
 
 
 def test_bounds_hold(monkeypatch):
-    """The model's operands of x and y are within their bounds, and not far within."""
+    """Operands of x and y that the model finds are within their bounds, and near the bounds."""
     rng, shares = np.random.default_rng(1), {}
 
     def note(name, largest):
@@ -300,18 +307,18 @@ def test_bounds_hold(monkeypatch):
 
 
 def test_adders_of_cordic_are_those_of_the_model(prove):
-    """By SAT; one adder does for the sum and for the difference."""
+    """By SAT. One adder serves the sum and the difference."""
     prove(of_adders())
 
 
 def test_bug_of_an_adder_is_found(refute, inject):
-    """A carry that is lost, injected in the hardware."""
+    """A carry that is lost, injected in the hardware, is found."""
     inject(blysk.hdl.cosines.angular_setup, "_added", "Cat(negate, b", "Cat(~negate, b")
     refute(of_adders(), 4)
 
 
 def test_angle_of_the_highlight_cosine_alone_wraps():
-    """It is counted in turns; all else has a format that holds it, or saturates."""
+    """This angle counts turns. All other words have formats that hold them, or saturate."""
     assert wrapped_by(HighlightCosineUnit()) == {HighlightCosine.PHASE_FORMAT}
 
 
@@ -319,7 +326,7 @@ SHORTER_FORMATS = {
     "x": (of_major, "AXIS_FORMAT", SQ(1, 26)),
     "y": (of_minor, "AXIS_FORMAT", SQ(1, 26)),
     "x and y of CORDIC": (of_rotation, "ROTATED_FORMAT", SQ(3, 26)),
-    # Both stay under 1/2.
+    # Both words stay under 1/2.
     "psi": (of_step, "ANGLE_FORMAT", UQ(-2, 36)),
     "step": (of_step, "STEP_FORMAT", UQ(-2, 40)),
 }
@@ -327,7 +334,7 @@ SHORTER_FORMATS = {
 
 @pytest.mark.parametrize("word", SHORTER_FORMATS)
 def test_formats_too_short_are_found(monkeypatch, word):
-    """An integer bit less than what is needed, injected in the parameters; of psi and its step two."""
+    """One integer bit fewer than needed, injected in the parameters, is found; two for psi and its step."""
     prove, name, format = SHORTER_FORMATS[word]
     monkeypatch.setattr(AngularSetup, name, format)
     with pytest.raises(AssertionError, match=" wraps in "):
@@ -338,28 +345,28 @@ def test_formats_too_short_are_found(monkeypatch, word):
     ("prove", "name", "format"), [(of_shift, "V_FORMAT", UQ(-1, 36)), (of_step, "PLACES_FORMAT", UQ(4, 0))]
 )
 def test_words_of_shifts_too_short_are_found(monkeypatch, prove, name, format):
-    """The same: v and the places by which psi's step is shifted."""
+    """The same for v and for the number of places by which psi's step is shifted."""
     monkeypatch.setitem(globals(), name, format)
     with pytest.raises(AssertionError, match=" wraps in "):
         prove()
 
 
 def test_minor_operand_too_short_is_found(inject):
-    """The same: ``minor 2^j``."""
+    """The same for ``minor 2^j``."""
     inject(AngularSetup, "_minor", "wrap(SQ(3, 34))", "wrap(SQ(2, 34))")
     with pytest.raises(AssertionError, match=" wraps in "):
         of_minor()
 
 
 def test_cos_beta_too_short_is_found(inject, monkeypatch):
-    """The same; two bits less, as its sums have the format of CORDIC's x."""
+    """The same with two bits fewer, because sums have the format of CORDIC's x."""
     inject(AngularSetup, "compute", "Fixed(SQ(4, self.GAIN_BITS)", "Fixed(SQ(2, self.GAIN_BITS)")
     with pytest.raises(AssertionError, match=" wraps in "):
         of_results(monkeypatch, of_rotation())
 
 
 def test_cosine_for_arccos_too_short_is_found(inject, monkeypatch):
-    """The same; two bits less, as the format of the dot product is that of three of the largest products."""
+    """The same with two bits fewer, because the dot product has the format of three largest products."""
     inject(AngularSetup, "_by_arccos", "Fixed(cross.format", "Fixed(SQ(2, 34)")
     with pytest.raises(AssertionError, match=" wraps in "):
         of_cosine(monkeypatch)
@@ -374,7 +381,7 @@ BUGS = {
 
 @pytest.mark.parametrize("bug", BUGS)
 def test_bugs_of_cordic_are_found(inject, bug):
-    """Injected in the model, each breaks what is said of a step."""
+    """Each bug, injected in the model, breaks a statement about a step."""
     inject(AngularSetup, "_polar", *BUGS[bug])
     with pytest.raises(AssertionError):
         of_rotation()
@@ -399,7 +406,10 @@ SHORTER_REGISTERS = {
 
 @pytest.mark.parametrize("word", SHORTER_REGISTERS)
 def test_registers_a_bit_too_short_are_found(inject, word):
-    """A slice of a bit less, injected in the hardware. Others are read in a format that refuses it."""
+    """A slice with one bit fewer, injected in the hardware, is found.
+
+    Other slices are read in a format that refuses them.
+    """
     inject(*SHORTER_REGISTERS[word])
     with pytest.raises(AssertionError, match="not those of"):
         of_registers("half_chord")

@@ -1,4 +1,4 @@
-"""Proofs of the lines of attributes: the words of each pixel are exact sums, cut, and belong to its span."""
+"""Proofs of lines of attributes: the words of each pixel are exact sums, cut, and belong to its span."""
 
 import pytest
 from amaranth.hdl import Signal, Value, signed
@@ -13,9 +13,9 @@ pytestmark = [pytest.mark.prove, pytest.mark.seldom]
 
 
 def of_words():
-    """Exact sums in words that cannot wrap move beside those of the unit, with what belongs to the span.
+    """Exact sums, in words that cannot wrap, move beside the sums of the unit, with the data of the span.
 
-    The domain: at every pixel of a span the exact value is in the format of the sum.
+    The domain: at every pixel of a span the exact value fits the format of the sum.
     """
     p = AttributeSpans(colors=False, coordinates=True)
     h = Harness(unit := AttributeSpansUnit(p))
@@ -67,7 +67,10 @@ def of_words():
 
 
 def test_words_are_exact_sums(prove):
-    """Inductive, all formats and lengths as built; while the output is ready, a pixel leaves every cycle."""
+    """By induction, for all formats and lengths as built.
+
+    While the output is ready, a pixel leaves in every cycle.
+    """
     prove(of_words())
 
 
@@ -81,6 +84,6 @@ BUGS = {
 
 @pytest.mark.parametrize("bug", BUGS)
 def test_bugs_are_found(refute, inject, bug):
-    """Injected in `AttributeSpansUnit`, each refutes the claims."""
+    """Each bug, injected in `AttributeSpansUnit`, refutes a claim."""
     inject(AttributeSpansUnit, "elaborate", *BUGS[bug])
     refute(of_words(), 10)

@@ -1,4 +1,4 @@
-"""Proofs of the chain of bisections: a span at a time, given once, on the clock on which it is due."""
+"""Proofs of the chain of bisections: it holds one span at a time, and offers it once, when it is due."""
 
 import pytest
 from amaranth.hdl import Cat, Mux, Signal
@@ -12,7 +12,7 @@ pytestmark = [pytest.mark.prove, pytest.mark.seldom]
 
 
 def of_spans():
-    """A model counts the cycles that a span still has to come."""
+    """A model counts the cycles until a span is due."""
     unit = BisectionChainUnit()
     h = Harness(unit)
     stays(h, unit.o)
@@ -30,7 +30,7 @@ def of_spans():
         h.m.d.sync += left.eq(left - 1)
     h.claim(unit.o.valid == (inside.any() & ~left.any()))
     h.claim(unit.i.ready == ~inside.any())
-    # What makes it inductive: the states, and the cycles from each to the end.
+    # These claims make the proof inductive: the states, and the cycles from each state to the end.
     state, step, remaining = (h.register(name) for name in ("fsm_state", "step", "remaining"))
     h.claim((state == 0) == ~inside.any())
     to_come = [ends - 1 + rounds(remaining) - step, 10 + rounds(remaining) - step, 10 - step, 0]
@@ -41,8 +41,10 @@ def of_spans():
 
 
 def test_spans(prove):
-    """Inductive, all levels: what waits stays; a span that is taken in is offered once, `latency` cycles on,
-    and until it is taken, no other is."""
+    """By induction, for all levels: a span that is taken is offered once, `latency` cycles later.
+
+    Until it is taken, no other span is offered, and it does not change.
+    """
     prove(of_spans())
 
 
@@ -55,6 +57,6 @@ BUGS = {
 
 @pytest.mark.parametrize("bug", BUGS)
 def test_bugs_are_found(refute, inject, bug):
-    """Injected in `BisectionChainUnit`, each refutes the claims."""
+    """Each bug, injected in `BisectionChainUnit`, refutes a claim."""
     inject(BisectionChainUnit, *BUGS[bug])
     refute(of_spans())

@@ -1,4 +1,4 @@
-"""Proofs of the accumulator: a span's pixels, all and in order, as exact sums that never wrap."""
+"""Proofs of the accumulator: all pixels of a span leave in order, as exact sums that never wrap."""
 
 import pytest
 from amaranth.hdl import Mux, Signal, Value, signed, unsigned
@@ -16,14 +16,14 @@ from .rules import answers, pixels_follow, stays, taken
 
 pytestmark = [pytest.mark.prove, pytest.mark.seldom]
 
-# The words of a normal's component, cut from 44 bits to 5 and from 18 to 3: as there, the sum and the
-# differences have an integer bit more than the result.
+# The words of a normal's component, with 5 bits in place of 44 and 3 in place of 18. As in the unit, the sum
+# and the differences have one integer bit more than the result.
 FORMATS = DifferenceAccumulator(SQ(1, 2), SQ(2, 3), SQ(2, 3), SQ(1, 2))
 LENGTH_BITS = 3
 
 
 class Narrow(AccumulatorUnit):
-    """One quadratic of narrow words."""
+    """One quadratic of short words."""
 
     def __init__(self):
         words = {name: FixedShape(FORMATS.difference_format) for name in ("first", "second")}
@@ -36,12 +36,12 @@ class Narrow(AccumulatorUnit):
 
 
 def of_pixels():
-    """Pixels are counted; those of a chosen span are exact sums, as long as these stay in the domain."""
+    """Claim the number of pixels. The pixels of a chosen span are exact sums, if these stay in the domain."""
     unit = Narrow()
     h = Harness(unit)
     span = unit.i.payload
     stays(h, unit.o)
-    # Three spans inside at most: what waits, the values, what the sums stand at, and what they take in.
+    # At most 3 pixels, and those of a whole span, are inside.
     owed = pixels_follow(h, unit.i, unit.o, span.length, 3 + (1 << LENGTH_BITS) - 1)
     answers(h, owed.any(), taken(unit.o), unit.latency - 1, unit.o.ready)
     answers(h, unit.i.valid, unit.i.ready, (1 << LENGTH_BITS) - 1, unit.o.ready)
@@ -49,29 +49,29 @@ def of_pixels():
 
 
 def test_pixels_are_as_many_as_asked_for(prove):
-    """Inductive, lengths 0 to 7: what waits stays, as many values leave as the lengths say, no deadlock.
+    """By induction, for lengths 0 to 7: as many values leave as the lengths say, and no beat is stuck.
 
-    While the output is ready, the first value leaves 3 cycles after its span was taken, then one every clock,
-    and a span is taken at the latest when the one before it has had a clock for each pixel.
+    While the output is ready, the first value of a span leaves 3 cycles after the span was taken, and then
+    one in every cycle. A span is taken as soon as the span before has had a cycle for each of its pixels.
     """
     prove(of_pixels())
 
 
 def fits(code, format):
-    """Whether a code is one of a format."""
+    """Whether a code fits a format."""
     return (code >= format.min_code) & (code <= format.max_code)
 
 
 def of_sums(unit):
-    """Exact sums in words that cannot wrap move beside those of the unit; what they would give leaves.
+    """Exact sums, in words that cannot wrap, move beside the sums of the unit.
 
-    The domain: at every pixel of a span the exact value is in the format of the sum. Where the differences
-    have fewer bits, every one from a pixel to the next is in theirs.
+    The domain: at every pixel of a span the exact value fits the format of the sum. If the differences have
+    fewer bits, every difference from a pixel to the next fits their format, too.
     """
     h = Harness(unit)
     m, length, comes = h.m, unit.i.payload.length, taken(unit.i)
     waits, entered, active, present, valid = stays(h, unit.o), Signal(), Signal(), Signal(), Signal()
-    # Pixels left of the span that was accepted last, and of that whose words the sums have.
+    # Pixels left of the span that was accepted last, and of the span whose words the sums hold.
     left, at = Signal(len(length)), Signal(len(length))
     m.d.comb += active.eq(left.any())
     with m.If(comes):
@@ -100,7 +100,7 @@ def of_sums(unit):
         start, first, second = (Value.cast(operand) for operand in operands)
         shift = p.format.fraction_bits - p.start_format.fraction_bits
         cut = p.format.fraction_bits - p.result_format.fraction_bits
-        # ``chord-local`` adds the half of a step, where it would take a sum to begin with, to the result.
+        # Where half a step would make the first sum wrap, ``chord-local`` adds it to the result.
         half = 1 << (cut - 1)
         late = half if "words" in unit.signature.members and shift < cut else 0
         with m.If(load):
@@ -135,11 +135,11 @@ SUMS = {
 
 @pytest.mark.parametrize("name", SUMS)
 def test_sums_are_exact(prove, name):
-    """Inductive, all formats and lengths as built: the values that leave are the exact sums, cut and clamped.
+    """By induction, for all formats and lengths as built: the values are the exact sums, cut and clamped.
 
-    So no sum wraps as long as the exact values of a span's pixels fit its format. Differences of a normal may
-    be any: these may wrap, and do no harm. Those of ``chord-local``, two bits shorter than the sums, must
-    fit theirs.
+    So no sum wraps if the exact values of a span's pixels fit its format. Differences of a normal may be any
+    numbers: they may wrap, and do no harm. Differences of ``chord-local`` are two bits shorter than the sums,
+    and must fit their format.
     """
     prove(of_sums(SUMS[name]()))
 
@@ -158,12 +158,12 @@ BUGS = {
 
 @pytest.mark.parametrize("bug", BUGS)
 def test_bugs_are_found(refute, inject, bug):
-    """Injected in `AccumulatorUnit`, each refutes the claim of exact sums."""
+    """Each bug, injected in `AccumulatorUnit`, refutes the claim of exact sums."""
     inject(AccumulatorUnit, "elaborate", *BUGS[bug])
     refute(of_sums(DifferenceAccumulatorUnit()), 10)
 
 
 def test_bug_of_the_skid_buffer_is_found(refute, inject):
-    """A value that is dropped while it waits refutes the count of pixels."""
+    """A value that is dropped while it waits refutes the claim on the number of pixels."""
     inject(difference_accumulator, "skid_buffer", "Mux(held, spare, Value.cast(payload))", "payload")
     refute(of_pixels(), 20)

@@ -1,4 +1,4 @@
-"""Proofs of fixed-point arithmetic: saturation never wraps, rounding errs by half a step at most."""
+"""Proofs of fixed-point arithmetic: saturation never wraps, and rounding errs by at most half a step."""
 
 import pytest
 from amaranth.hdl import Mux, Shape, Signal, Value
@@ -10,7 +10,8 @@ from .prover import Harness
 
 pytestmark = pytest.mark.prove
 
-# From and to: pairs that units use, each way of signs, and the same number of bits.
+# Pairs of formats, from and to. Units use pairs of these kinds: each combination of signs, and equal numbers
+# of bits.
 PAIRS = [
     (SQ(3, 17), SQ(1, 17)),
     (SQ(4, 34), UQ(1, 34)),
@@ -20,12 +21,12 @@ PAIRS = [
     (UQ(2, 17), SQ(1, 17)),
     (SQ(1, 17), UQ(0, 17)),
 ]
-# From, and fraction bits that stay.
+# The format, and the number of fraction bits that stay.
 CUTS = [(SQ(4, 34), 17), (UQ(1, 25), 17), (SQ(2, 20), 0)]
 
 
 def any_code(source):
-    """A register that takes any code of a format."""
+    """A register with any code of a format."""
     h = Harness()
     code = Signal(Shape(source.width, source.signed))
     h.m.d.sync += code.eq(h.free(source.width, "given"))
@@ -33,7 +34,7 @@ def any_code(source):
 
 
 def of_saturation(source, target):
-    """Against comparisons of the codes."""
+    """Claim that saturation gives what comparisons of the codes give."""
     h, code = any_code(source)
     result = Value.cast(FixedValue(source, code).saturate(target))
     raised = Mux(code < target.min_code, target.min_code, code)
@@ -42,7 +43,7 @@ def of_saturation(source, target):
 
 
 def of_rounding(source, bits):
-    """The error, times two, is from over minus one step to one step."""
+    """Claim that twice the error is more than -1 step and at most 1 step."""
     h, code = any_code(source)
     dropped = source.fraction_bits - bits
     error = (Value.cast(FixedValue(source, code).round_half_up(bits)) << dropped) - code
@@ -51,7 +52,7 @@ def of_rounding(source, bits):
 
 
 def of_cutting(source, bits):
-    """The error is from over minus one step to 0."""
+    """Claim that the error is more than -1 step and at most 0."""
     h, code = any_code(source)
     dropped = source.fraction_bits - bits
     error = (Value.cast(FixedValue(source, code).truncate(bits)) << dropped) - code
@@ -61,19 +62,19 @@ def of_cutting(source, bits):
 
 @pytest.mark.parametrize(("source", "target"), PAIRS)
 def test_saturation_never_wraps(prove, source, target):
-    """For every code: the nearest of the format's, by comparison."""
+    """For every code, saturation gives the nearest code of the format."""
     prove(of_saturation(source, target))
 
 
 @pytest.mark.parametrize(("source", "bits"), CUTS)
 def test_rounding_errs_by_half_a_step(prove, source, bits):
-    """For every code: half up, by half a step at most."""
+    """For every code, rounding half up errs by at most half a step."""
     prove(of_rounding(source, bits))
 
 
 @pytest.mark.parametrize(("source", "bits"), CUTS)
 def test_cutting_errs_by_less_than_a_step(prove, source, bits):
-    """For every code: never upwards."""
+    """For every code, truncation never rounds upwards."""
     prove(of_cutting(source, bits))
 
 
@@ -99,20 +100,20 @@ BUGS = {
 
 @pytest.mark.parametrize("bug", BUGS)
 def test_bugs_of_saturation_are_found(refute, inject, bug):
-    """Injected in `FixedValue.saturate`, each refutes the claim for a pair of formats."""
+    """Each bug, injected in `FixedValue.saturate`, refutes the claim for a pair of formats."""
     formats, *change = BUGS[bug]
     inject(FixedValue, "saturate", *change)
     refute(of_saturation(*formats), 4)
 
 
 def test_bug_of_rounding_is_found(refute, inject):
-    """Cut instead."""
+    """A cut in place of rounding half up is found."""
     inject(FixedValue, "round_half_up", "self._code[dropped - 1]", "0")
     refute(of_rounding(SQ(4, 34), 17), 4)
 
 
 def test_bug_of_cutting_is_found(refute, inject):
-    """Towards 0 instead: negative codes go up."""
+    """Rounding towards 0 is found, because negative codes go up."""
     kept = "self._code[self.format.fraction_bits - fraction_bits :]"
     inject(FixedValue, "truncate", kept, f"({kept} + self._code[-1])[: format.width]")
     refute(of_cutting(SQ(4, 34), 17), 4)

@@ -1,4 +1,4 @@
-"""Proofs of the highlight-cosine unit: a span's pixels, all and in order, each at its angle."""
+"""Proofs of the highlight-cosine unit: all pixels of a span leave in order, each with its angle."""
 
 import pytest
 from amaranth.hdl import Cat, Value
@@ -16,7 +16,7 @@ LATENCY = 3
 
 @pytest.fixture(autouse=True)
 def stub(monkeypatch):
-    """Of the angle two bits, of cos beta one, through two registers."""
+    """A stub of the wave: two registers for two bits of the angle and a bit of cos beta."""
 
     def bits(theta, cos_beta):
         return Cat(theta[:2], Value.cast(cos_beta)[0])
@@ -26,7 +26,7 @@ def stub(monkeypatch):
 
 
 def of_pixels():
-    """Spans of 0 to 3 pixels, whose angles fall by one step of the word a pixel."""
+    """Claim on spans of 0 to 3 pixels, whose angles fall by one step of the word at each pixel."""
     unit = HighlightCosineUnit()
     h = Harness(unit)
     span = unit.i.payload
@@ -44,11 +44,12 @@ def of_pixels():
 
 
 def test_pixels(prove):
-    """Inductive, lengths 0 to 3, `LATENCY` cycles in place of 12: what waits stays; a span's pixels leave in
-    order, each once, each at its angle and with its span's cos beta.
+    """By induction, for lengths 0 to 3 and `LATENCY` cycles in place of 12: pixels leave in order and once
+    each.
 
-    While the output is ready, the first leaves `LATENCY` cycles after its span was accepted, then one every
-    cycle, and a span is taken in 3 cycles, and one.
+    Each pixel has its angle and its span's cos beta, and a pixel that waits does not change. While the output
+    is ready, the first pixel leaves `LATENCY` cycles after its span was accepted, and then one in every
+    cycle. A span is taken after at most 4 cycles.
     """
     prove(of_pixels())
 
@@ -64,6 +65,6 @@ BUGS = {
 
 @pytest.mark.parametrize("bug", BUGS)
 def test_bugs_are_found(refute, inject, bug):
-    """Injected in `HighlightCosineUnit`, each refutes the claims."""
+    """Each bug, injected in `HighlightCosineUnit`, refutes a claim."""
     inject(HighlightCosineUnit, "elaborate", *BUGS[bug])
     refute(of_pixels(), 20)

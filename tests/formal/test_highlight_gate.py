@@ -1,4 +1,4 @@
-"""Proof by exhaustion of the gate at reduced width: it stops no span in which a pixel may be shaded."""
+"""Proof by exhaustion of the gate with short words: it stops no span in which a pixel may be shaded."""
 
 from math import isqrt
 
@@ -23,12 +23,13 @@ def one_of(gate):
 
 
 def reached(gate, left, right, halfway):
-    """Highest threshold that the square of N.H reaches on the arc between two normals, by its definition.
+    """Largest threshold that the square of N.H reaches on the arc between two normals.
 
-    With a, b and c for the three dot products, c over that of a unit vector with itself, N.H at a share x of
-    the arc is ``(a sin((1 - x) psi) + b sin(x psi)) / sin psi``, ``cos psi = c``. The largest is a, b, or,
-    where ``b > a c`` and ``a > b c``, the root of ``(a^2 + b^2 - 2 a b c) / (1 - c^2)``. No pixel of the
-    span, however long it is, has more. Here all are integers, and no word but the result is cut.
+    Let a, b and c be the three dot products; c is divided by that of a unit vector with itself, so
+    ``cos psi = c``. At a share x of the arc, N.H is ``(a sin((1 - x) psi) + b sin(x psi)) / sin psi``. Its
+    maximum is a, or b. If ``b > a c`` and ``a > b c``, it is the root of
+    ``(a^2 + b^2 - 2 a b c) / (1 - c^2)``. No pixel of a span, however long, has a larger N.H. This function
+    computes with integers, and cuts only the result.
     """
     pairs = (left, halfway), (right, halfway), (left, right)
     a, b, c = (np.einsum("...i,...i->...", *pair) for pair in pairs)
@@ -41,26 +42,27 @@ def reached(gate, left, right, halfway):
 
 
 def grid(gate, dimensions):
-    """Every vector of codes, but the one most negative, which no unit vector has."""
+    """Every vector of codes, without the most negative code, which unit vectors do not have."""
     codes = np.arange(-one_of(gate), one_of(gate) + 1)
     return codes[np.indices((len(codes),) * dimensions).reshape(dimensions, -1).T]
 
 
 def is_unit(gate, vectors, off):
-    """Whether lengths are off 1 by less than so many steps."""
+    """Whether lengths differ from 1 by less than some steps."""
     return np.abs(np.linalg.norm(vectors, axis=-1) - one_of(gate)) < off
 
 
 def is_near(gate, vectors):
-    """Pairs of which the gate does not say that they are out of range, and some just out of it."""
+    """Pairs that the gate does not flag as out of range, and some pairs just out of range."""
     limit = (gate.widest.codes.item() + 2) << gate.fraction_bits - 1
     return one_of(gate) ** 2 - vectors @ vectors.T < limit
 
 
 def in_a_plane(gate):
-    """Ends of any codes up to 45 degrees apart, and of unit length to half a step at any angle; H on an axis.
+    """Ends and H in the plane y = 0, with H on an axis.
 
-    The plane is y = 0, and H is in it.
+    Ends have any codes if they are up to 45 degrees apart. At any angle, ends have unit length to half a
+    step.
     """
     vectors = grid(gate, 2)
     unit = is_unit(gate, vectors, 0.5)
@@ -70,7 +72,10 @@ def in_a_plane(gate):
 
 
 def off_the_plane(gate):
-    """Ends of that plane, of unit length to half a step, up to 45 degrees apart; H, to 0.1 steps, x = 0."""
+    """Ends in the plane y = 0, of unit length to half a step and up to 45 degrees apart.
+
+    H has unit length to 0.1 steps, and x = 0.
+    """
     vectors = grid(gate, 2)
     halfways = vectors[is_unit(gate, vectors, 0.1) & (vectors >= 0).all(axis=1)]
     vectors = vectors[is_unit(gate, vectors, 0.5)]
@@ -80,7 +85,10 @@ def off_the_plane(gate):
 
 
 def anywhere(gate):
-    """Ends of unit length to 0.02 steps, up to 45 degrees apart; H one of them, of a 48th of the sphere."""
+    """Ends of unit length to 0.02 steps, up to 45 degrees apart.
+
+    H is one of these vectors, in a 48th of the sphere.
+    """
     units = grid(gate, 3)
     units = units[is_unit(gate, units, 0.02)]
     left, right = np.nonzero(is_near(gate, units))
@@ -88,7 +96,10 @@ def anywhere(gate):
 
 
 def stopped(gate, left, right, halfways):
-    """Share of the spans that the unit stops, at every word of its PROM; none reaches that threshold."""
+    """Share of the spans that the unit stops, over all words of its PROM.
+
+    No stopped span may reach its threshold.
+    """
     unit, beats = HighlightGateUnit(gate, initiation_interval=1), {"normal_left": left, "normal_right": right}
     words, exponents = np.unique(gate.thresholds.codes[1 : MAX_EXPONENT + 1], return_index=True)
     count = 0
@@ -98,7 +109,7 @@ def stopped(gate, left, right, halfways):
             constants = {"halfway": halfway[np.newaxis], "exponent": exponent}
             run = simulate(unit, beats, count=len(left), constants=constants, engine="auto")
             stops = run.beats == 0
-            # With a threshold of 0 all may be lit, where N.H is negative too.
+            # With a threshold of 0 every span may be lit, because a negative N.H may be lit, too.
             assert not stops[highest >= threshold].any(), f"lost highlights, exponent {exponent}"
             count += np.count_nonzero(stops)
     return count / (len(halfways) * len(words) * len(left))
@@ -109,7 +120,7 @@ def stopped(gate, left, right, halfways):
     [(5, in_a_plane, 1_233_844), (6, off_the_plane, 30 * 33_476), (5, anywhere, 13 * 42_774)],
 )
 def test_no_span_that_reaches_a_threshold_is_stopped(bits, spans, cases):
-    """Words of 5 or 6 fraction bits, all cases; at each of the words that the PROM has."""
+    """Words of 5 or 6 fraction bits, for all cases and all words of the PROM."""
     gate = HighlightGate(LIMITS, fraction_bits=bits)
     left, right, halfways = spans(gate)
     assert len(left) * len(halfways) == cases
@@ -117,7 +128,7 @@ def test_no_span_that_reaches_a_threshold_is_stopped(bits, spans, cases):
 
 
 def shades_nothing_under(gate):
-    """The unit's term of the largest N.H under each threshold is 0."""
+    """Check that the unit's term is 0 for the largest N.H under each threshold."""
     thresholds, specular = gate.thresholds.codes.tolist(), gate.specular
     for exponent in np.flatnonzero(thresholds[: MAX_EXPONENT + 1]).tolist():
         under = isqrt((thresholds[exponent] << 68 - gate.fraction_bits) - 1)
@@ -128,7 +139,10 @@ def shades_nothing_under(gate):
 
 @pytest.mark.parametrize("bits", [5, 6, 17])
 def test_nothing_is_shaded_under_a_threshold(bits):
-    """At any exponent, the term of the largest N.H under its threshold is 0; none is larger farther down."""
+    """At any exponent, the term of the largest N.H under the threshold is 0.
+
+    Smaller N.H have no larger term.
+    """
     shades_nothing_under(HighlightGate(LIMITS, fraction_bits=bits))
 
 
@@ -152,7 +166,7 @@ BUGS = {
 
 @pytest.mark.parametrize("bug", BUGS)
 def test_bugs_are_found(inject, bug):
-    """Injected in the unit, each stops a span that reaches its threshold."""
+    """Each bug, injected in the unit, stops a span that reaches its threshold."""
     inject(HighlightGateUnit, *BUGS[bug])
     gate = HighlightGate(LIMITS, fraction_bits=6)
     with pytest.raises(AssertionError, match=r"^lost highlights"):
@@ -160,7 +174,8 @@ def test_bugs_are_found(inject, bug):
 
 
 def test_bug_of_spans_out_of_range_is_found(inject):
-    """Taken as others, they reach their thresholds where they are stopped."""
+    """If spans out of range are treated as other spans, some are stopped although they reach their
+    threshold."""
     inject(HighlightGateUnit, "_lit_by", "out_of_range | bright", "bright")
     gate = HighlightGate(LIMITS, fraction_bits=5)
     with pytest.raises(AssertionError, match=r"^lost highlights"):
@@ -169,7 +184,8 @@ def test_bug_of_spans_out_of_range_is_found(inject):
 
 @pytest.mark.parametrize(("bits", "steps"), [(5, 1), (6, 1), (17, 12)])
 def test_bug_of_thresholds_is_found(monkeypatch, bits, steps):
-    """Words of the PROM too high: by a step, or by more than the margin for the pixels' errors."""
+    """Words of the PROM that are too high are found: by one step, or by more than the margin for errors of
+    pixels."""
     gate = HighlightGate(LIMITS, fraction_bits=bits)
     codes = gate.thresholds.codes
     high = np.minimum(codes + steps * (codes > 0), gate.level_format.max_code)
@@ -179,7 +195,7 @@ def test_bug_of_thresholds_is_found(monkeypatch, bits, steps):
 
 
 def test_bug_of_the_cutoff_is_found(inject):
-    """The specular unit shades as far as its parabola goes."""
+    """If the specular unit has no cutoff, it shades all of its parabola, and this is found."""
     inject(Specular, "compute", "lit &= shifted <= self.boundaries[exponent]", "pass")
     with pytest.raises(AssertionError, match=r"^lit under the threshold"):
         shades_nothing_under(HighlightGate(LIMITS))

@@ -14,7 +14,10 @@ pytestmark = pytest.mark.prove
 
 
 def of_sums(lights):
-    """A sum with bits to spare moves beside the unit's; products may be any, constants and terms too."""
+    """A sum with spare bits moves beside the sum of the unit.
+
+    Products, constants and terms may have any value.
+    """
     unit = CompactIntensityUnit(Intensity(lights))
     h = Harness(unit)
     total, product, note = (Value.cast(h.register(name)) for name in ("total", "product", "note_1"))
@@ -31,7 +34,7 @@ def of_sums(lights):
             terms.eq(Mux(first, 1, terms + (terms <= 2 * lights))),
         ]
     h.claim(total == out_of_range)
-    # What leads there: ambient light and each term have 11 bits before the point.
+    # Bounds that make the proof inductive: ambient light and each term have 11 bits before the point.
     h.claim(terms <= 2 * lights)
     h.claim(out_of_range <= (terms + 1) << len(product))
     return h
@@ -39,19 +42,19 @@ def of_sums(lights):
 
 @pytest.mark.parametrize("lights", [1, 2, 4, 16])
 def test_sums_do_not_wrap(prove, lights):
-    """Inductive: the sum is the exact one, of ambient light and two terms a light at most."""
+    """By induction: the sum is the exact sum of ambient light and at most two terms a light."""
     prove(of_sums(lights))
 
 
 def test_bug_is_found(refute, inject):
-    """A bit less, injected in the unit."""
+    """A sum with a bit less, injected in the unit, is found."""
     inject(CompactIntensityUnit, "elaborate", "UQ(11 + self._terms.bit_length(), 23)", "UQ(12, 23)")
     refute(of_sums(1))
 
 
 @pytest.fixture
 def choices(monkeypatch):
-    """The product with a term of a half or of none, exact; products of any terms would be cut."""
+    """Exact product with a term of 1/2 or 0. Products of other terms would be cut."""
 
     def half(term, color):
         format = term.format * color.format
@@ -62,7 +65,7 @@ def choices(monkeypatch):
 
 
 def of_pixels(channels):
-    """Each term is a half or nothing; half of its colour is a bit of its own in the channel."""
+    """Claims on pixels. Each term is 1/2 or 0, and half of its colour is a separate bit of the channel."""
     unit = CompactIntensityUnit(Intensity(channels=channels))
     h = Harness(unit)
     terms = [Value.cast(term) for kind in unit.kinds for term in unit.i.payload[kind]]
@@ -86,15 +89,18 @@ def of_pixels(channels):
     return h
 
 
-# One channel: no invariant is found in time.
+# Only one channel, because otherwise no invariant is found in time.
 PIXELS_CLOCKS = {3: None, 1: 16}
 
 
 @pytest.mark.parametrize("channels", PIXELS_CLOCKS)
 def test_pixels(prove, choices, channels):
-    """Inductive, but for `PIXELS_CLOCKS`, one light: what waits stays; pixels leave in order, each once, each
-    as the sum of its own terms; while the output is ready, one leaves in the cycles of a pixel with every
-    term, and one is taken in as many as that has products, and one."""
+    """By induction (`PIXELS_CLOCKS` cycles for one light): pixels leave in order and once each, as sums of
+    their terms.
+
+    A pixel that waits does not change. While the output is ready, a pixel leaves within the cycles of a pixel
+    with every term. A pixel is taken within one cycle more than its number of products.
+    """
     prove(of_pixels(channels), PIXELS_CLOCKS[channels])
 
 
@@ -121,6 +127,6 @@ PIXEL_BUGS = {
 
 @pytest.mark.parametrize("bug", PIXEL_BUGS)
 def test_bugs_of_pixels_are_found(refute, inject, choices, bug):
-    """Injected in the unit, each refutes the claims on pixels."""
+    """Each bug, injected in the unit, refutes a claim on pixels."""
     inject(CompactIntensityUnit, *PIXEL_BUGS[bug])
     refute(of_pixels(3), 24)

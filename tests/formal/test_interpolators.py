@@ -1,10 +1,10 @@
 # amaranth: UnusedElaboratable=no
-"""Proofs about interpolators, of proven units put together: a span's pixels leave, all and in order.
+"""Proofs about interpolators, which are made of proven units: all pixels of a span leave, in order.
 
-The parts are proved by themselves. In the place of each `PipelinedUnit` is one of the same streams and
-control and of 1 to 3 cycles, which hands on a word: a tag of the span, and the pixel's place in it.
-Accumulators, recurrence and highlight cosine keep their control, and take words of few bits from pixel to
-pixel; normaliser and quadratic evaluator are accumulators.
+The parts are proved in other files. A stub replaces each `PipelinedUnit`: it has the same streams and
+control, takes 1 to 3 cycles, and passes on a word. The word is a tag of the span and the pixel's position in
+the span. Accumulators, recurrence and highlight cosine keep their control, and take words of few bits from
+pixel to pixel. Accumulators replace the normaliser and the quadratic evaluator.
 """
 
 import itertools
@@ -77,12 +77,12 @@ pytestmark = pytest.mark.prove
 
 @pytest.fixture(autouse=True)
 def stubs(monkeypatch):
-    """The parts of interpolators are short ones."""
+    """Replace the parts of interpolators by short parts."""
     replace_parts(monkeypatch)
 
 
 class Stretch(NamedTuple):
-    """From a stream of the unit to another: spans or pixels, and where both have their word."""
+    """The part of a unit from one stream to another, with functions that find the word of each beat."""
 
     source: stream.Interface
     sink: stream.Interface
@@ -90,12 +90,12 @@ class Stretch(NamedTuple):
     found: Callable
     capacity: int
     also: Callable | None = None
-    """What else is claimed of a span that came and one that leaves."""
+    """A further claim on a span that came and a span that leaves."""
     pieces: Callable | None = None
-    """Number of spans that leave for one that comes; ``also`` is then told which of them it is."""
+    """Number of spans that leave for one that comes. ``also`` then gets the number of the span, too."""
 
     def follow(self, harness: Harness, *, exact: bool = True) -> Signal:
-        """Claim that what comes leaves, in order, each once; the result: how much is inside."""
+        """Claim that beats leave in order and once each. The result is the number of beats inside."""
         source, sink, find, found, capacity, also, pieces = self
         if pieces is not None:
 
@@ -123,26 +123,26 @@ class Stretch(NamedTuple):
 
 
 def has_length(channel: stream.Interface) -> bool:
-    """Whether it has spans, not pixels."""
+    """Whether the stream has spans, and not pixels."""
     return "length" in getattr(channel.payload.shape(), "members", {})
 
 
 def held(*units: PipelinedUnit) -> int:
-    """Beats that units hold at most."""
+    """Largest number of beats in some units."""
     return sum(-(-unit.latency // unit.initiation_interval) + 1 for unit in units)
 
 
 def pixels_held(unit) -> int:
-    """Pixels that a unit holds at most: in its registers, one that waits, and the rest of a span."""
+    """Largest number of pixels in a unit: in its registers, one that waits, and the rest of a span."""
     return unit.latency + (1 << LENGTH_BITS) - 1
 
 
 REGISTERED = 2
-"""Beats that a connection with registers holds at most."""
+"""Largest number of beats in a connection with registers."""
 
 
 def curve_stretches(unit, source=None, find=left) -> Iterator[Stretch]:
-    """Setup, registers, accumulator, products."""
+    """Stretches of a method with setup, registers, accumulator and products."""
     setup, accumulator, products = unit._setup, unit._accumulator, unit._products
     yield Stretch(source or unit.i, setup.o, find, start, held(setup))
     yield Stretch(setup.o, accumulator.i, start, start, REGISTERED)
@@ -151,7 +151,7 @@ def curve_stretches(unit, source=None, find=left) -> Iterator[Stretch]:
 
 
 def line_stretches(unit) -> Iterator[Stretch]:
-    """Setup, registers, accumulator, renormaliser, products."""
+    """Stretches of a method with setup, registers, accumulator, renormaliser and products."""
     setup, accumulator, products = unit._setup, unit._accumulator, unit._products
     yield Stretch(unit.i, setup.o, left, start, held(setup))
     yield Stretch(setup.o, accumulator.i, start, line_start, REGISTERED)
@@ -161,14 +161,15 @@ def line_stretches(unit) -> Iterator[Stretch]:
 
 
 def quadratic_stretches(unit) -> Iterator[Stretch]:
-    """Preparation with the lengths round it, then those of a curve."""
+    """Stretches of a method with a preparation and lengths beside it, followed by the stretches of a
+    curve."""
     setup = unit._setup
     yield Stretch(unit.i, setup.i, left, constant_coefficient, held(unit._middle, unit._gpq))
     yield from curve_stretches(unit, setup.i, constant_coefficient)
 
 
 def evaluator_stretches(unit) -> Iterator[Stretch]:
-    """Preparation with the lengths round it, evaluator, products."""
+    """Stretches of a method with a preparation and lengths beside it, evaluator and products."""
     evaluator, products = unit._evaluator, unit._products
     capacity = held(unit._middle, unit._gpq)
     yield Stretch(unit.i, evaluator.i, left, constant_coefficient, capacity)
@@ -177,20 +178,21 @@ def evaluator_stretches(unit) -> Iterator[Stretch]:
 
 
 def spans_stretches(unit, sink=None) -> Iterator[Stretch]:
-    """Setup with starts, lengths and decisions beside it, and accumulators."""
+    """Stretches of a method with a setup, accumulators, and starts, lengths and decisions beside the
+    setup."""
     capacity = unit.starts_inside * ((1 << LENGTH_BITS) - 1) + pixels_held(unit._accumulator)
     yield Stretch(unit.i, sink or unit.o, value, cosine, capacity)
 
 
 def words_meet(harness: Harness, unit: ChordSpansUnit) -> None:
-    """Claim that the accumulators take the start and the differences of one span."""
+    """Claim that the accumulators take the start and the differences of the same span."""
     accumulator = unit._accumulator
     same = tag(light_difference(accumulator.words)) == tag(light_start(accumulator.words))
     harness.claim(~(accumulator.taken & unit._takes_long) | same)
 
 
 def angular_stretches(unit) -> Iterator[Stretch]:
-    """Setup, registers, cosine, of each chain."""
+    """Stretches of setup, registers and cosine, for each chain."""
     for setup, cosines in unit._chains.values():
         yield Stretch(unit.i, setup.o, left, phase, held(setup))
         yield Stretch(setup.o, cosines.i, phase, phase, REGISTERED)
@@ -198,7 +200,7 @@ def angular_stretches(unit) -> Iterator[Stretch]:
 
 
 def recurrence_stretches(unit) -> Iterator[Stretch]:
-    """Setup; registers and recurrence of L of the first light and of H of the second."""
+    """Stretches of the setup, of the recurrence of L of the first light, and of H of the second light."""
     setup = unit._setup
     yield Stretch(unit.i, setup.o, left, partial(first_value, light=0), held(setup))
     for light, copy in enumerate(("diffuse", "highlight")):
@@ -210,14 +212,14 @@ def recurrence_stretches(unit) -> Iterator[Stretch]:
 
 
 def bisection_stretches(unit) -> Iterator[Stretch]:
-    """Normaliser, products."""
+    """Stretches of normaliser and products."""
     products = unit._products
     yield Stretch(unit.i, products.i, left, normal, pixels_held(unit._normaliser))
     yield Stretch(products.i, unit.o, normal, cosine, held(products))
 
 
 def quotient_stretches(unit) -> Iterator[Stretch]:
-    """Spans of vectors, quotients."""
+    """Stretches of spans of vectors and of quotients."""
     spans, quotient = unit._spans, unit._quotient
     yield Stretch(unit.i, quotient.i, vector_start, vector_line, pixels_held(spans))
     yield Stretch(quotient.i, unit.o, vector_line, cosine, held(quotient))
@@ -227,7 +229,7 @@ OPTIONS = {"setup_interval": INTERVAL, "length_bits": LENGTH_BITS}
 
 
 def spans_of(lights: int) -> ChordSpansUnit:
-    """Spans of values."""
+    """Stretches of spans of values."""
     options = {"initiation_interval": INTERVAL, "length_bits": LENGTH_BITS}
     return ChordSpansUnit(LocalChordInterpolator(), lights, **options)
 
@@ -264,12 +266,12 @@ UNITS = {
 
 
 def marks_of(name: str):
-    """Units of the documents' methods are proved seldom."""
+    """Marks of a unit's tests: units of the documents' methods are proved seldom."""
     return [pytest.mark.seldom] * (not name.startswith(("chord", "renormalise")))
 
 
 def in_step(harness: Harness) -> None:
-    """Claim that units side by side are ready, and offer what they have, on the same cycles."""
+    """Claim that units side by side are ready in the same cycles, and offer beats in the same cycles."""
     unit = harness.unit
     if isinstance(unit, AngularInterpolatorUnit):
         rows = list(zip(*unit._chains.values(), strict=True))
@@ -285,7 +287,7 @@ def in_step(harness: Harness) -> None:
 
 
 def tells_length(harness: Harness) -> None:
-    """Assume of what spans of values come with that it is as `of_pairs` claims."""
+    """Assume that spans of values come with the signals that `of_pairs` claims."""
     unit = harness.unit
     if isinstance(unit, ChordSpansUnit):
         harness.assume(unit.long == (unit.i.payload.length > 1))
@@ -293,7 +295,10 @@ def tells_length(harness: Harness) -> None:
 
 
 def of_pairs() -> Harness:
-    """Of spans of values one of two pixels becomes two of one, from its ends; any other passes as it is."""
+    """Claim that a span of two pixels becomes two spans of one pixel, with the values at its ends.
+
+    Any other span passes unchanged.
+    """
     h = Harness(unit := LocalChordInterpolatorUnit(LocalChordInterpolator(), 1, **OPTIONS))
     given, spans, long = unit.i, unit._spans.i, unit._spans.long
     came, goes, pair = given.payload, spans.payload, given.payload.length == 2
@@ -310,7 +315,7 @@ def of_pairs() -> Harness:
 
 
 def of_stretch(name: str, place: int) -> Harness:
-    """One of the stretches of a unit, and that units side by side are in step."""
+    """Claims on one stretch of a unit, and the claim that units side by side move in the same cycles."""
     make, stretches = UNITS[name]
     h = Harness(unit := make())
     tells_length(h)
@@ -320,7 +325,10 @@ def of_stretch(name: str, place: int) -> Harness:
 
 
 def of_cycles(name: str, *, exact: bool = False) -> Harness:
-    """Spans of a pixel or more, on all stretches at once: counted, or followed exactly."""
+    """Claims on spans of one pixel or more, on all stretches together.
+
+    Beats are counted, or followed exactly.
+    """
     make, stretches = UNITS[name]
     h = Harness(unit := make())
     h.assume(unit.i.payload.length != 0)
@@ -328,13 +336,13 @@ def of_cycles(name: str, *, exact: bool = False) -> Harness:
     in_step(h)
     stays(h, unit.o)
     found = list(stretches(unit))
-    # Of all stretches each begins where another ends.
+    # Each stretch begins at the input, or where another stretch ends.
     ends = {id(unit.i), *(id(stretch.sink) for stretch in found)}
     assert len(found) == STRETCHES[name]
     assert all(id(stretch.source) in ends for stretch in found)
     inside = [stretch.follow(h, exact=exact).any() for stretch in found]
     answers(h, Cat(inside).any(), taken(unit.o), unit.latency, unit.o.ready)
-    # Beside a FIFO a span may wait for the pixels of another, and for the interval of its setup.
+    # Beside a FIFO a span may wait for the pixels of another span, and for the interval of its setup.
     patience = (
         (1 << LENGTH_BITS) - 1 + INTERVAL
         if isinstance(unit, ChordSpansUnit | LocalChordInterpolatorUnit)
@@ -358,8 +366,10 @@ STRETCHES = {
 
 
 BOUNDED = {"chord_spans": 14}
-"""Cycles from power-up of what is not decided in time for runs of any length: FIFOs beside a setup. These
-take 15 seconds of a processor; each further cycle more than doubles that."""
+"""Cycles from power-up, for FIFOs beside a setup, which are not decided in time for runs of any length.
+
+These cycles take 15 seconds of a processor; each further cycle more than doubles the time.
+"""
 
 JOINED = (("chord_spans", 0),)
 """The stretches with these FIFOs."""
@@ -370,26 +380,31 @@ JOINED = (("chord_spans", 0),)
     [pytest.param(name, k, marks=marks_of(name)) for name, n in STRETCHES.items() for k in range(n)],
 )
 def test_pixels(prove, name, place):
-    """Spans of 0 to 3 pixels, setups of an interval of 2: what comes to a stretch leaves it, in order, each
-    once, as what it is, and no more are inside than its units hold. Inductive, but of `JOINED`.
+    """By induction (except `JOINED`): beats of a stretch leave in order and once each, with their own word.
 
-    The stretches follow each other from the input to the output: one ends with the stream with which the next
-    begins. So a span's pixels leave the whole, all and in order, each at its place, with the tag of its span.
-    Units side by side take and give on the same cycles, those of the output.
+    Spans have 0 to 3 pixels, and setups an interval of 2. No more beats are inside than the units of the
+    stretch hold.
+
+    The stretches lead from the input to the output: where one ends, the next begins. So all pixels of a span
+    leave in order, each with its position and the tag of its span. Units side by side move in the same cycles
+    as the output.
     """
     prove(of_stretch(name, place), BOUNDED[name] if (name, place) in JOINED else None)
 
 
 @pytest.mark.parametrize("name", [pytest.param(name, marks=marks_of(name)) for name in UNITS])
 def test_stability_and_progress(prove, name):
-    """Spans of 1 to 3 pixels: what waits stays; while the output is ready, a pixel that is to come leaves,
-    and a span that is offered is taken, in as many cycles as the latency and one. Inductive, but of
-    `BOUNDED`; where a FIFO stands beside a setup, a span may wait some cycles more."""
+    """By induction (except `BOUNDED`), for spans of 1 to 3 pixels: no beat is stuck, and a beat that waits
+    does not change.
+
+    While the output is ready, a pixel leaves, or an offered span is taken, within the latency and one cycle.
+    If a FIFO stands beside a setup, a span may wait some cycles longer.
+    """
     prove(of_cycles(name), BOUNDED.get(name))
 
 
-# Of each bug the unit of which it refutes the claims, the text where it is injected, the bug, the method if
-# it is not the usual one.
+# For each bug: the unit whose claims it refutes, the text where it is injected, and the bug. The method is
+# named if it is not the usual method.
 BUGS = {
     "any span is taken in": ("linear", "setup.i.valid.eq(self.i.valid)", "setup.i.valid.eq(1)"),
     "spans are lost at the input": ("linear", "self.i.ready.eq(setup.i.ready)", "self.i.ready.eq(1)"),
@@ -445,7 +460,7 @@ BUGS = {
 
 @pytest.mark.parametrize("bug", BUGS)
 def test_bugs_are_found(refute, inject, bug):
-    """Injected in an interpolator, each refutes one of its claims."""
+    """Each bug, injected in an interpolator, refutes one of its claims."""
     name, text, change, *method = BUGS[bug]
     unit = type(UNITS[name][0]())
     usual = "source" if issubclass(unit, NormalInterpolatorUnit) else "elaborate"
@@ -461,14 +476,14 @@ def test_bugs_are_found(refute, inject, bug):
     ],
 )
 def test_lost_products_are_found(refute, inject, name):
-    """Products that are dropped while they wait, injected in all methods that find normals."""
+    """Products that are dropped while they wait are found in all methods that find normals."""
     flag = "self.out_of_range.eq(out_of_range)"
     inject(NormalInterpolatorUnit, "elaborate", flag, f"products.o.ready.eq(1), {flag}")
     refute(of_cycles(name, exact=True), 30)
 
 
 def test_pairs_are_divided(prove):
-    """Inductive, at once."""
+    """By induction."""
     prove(of_pairs())
 
 
@@ -486,7 +501,7 @@ def test_lost_second_pixels_are_found(refute, inject, text, change):
 
 
 def test_dropped_cosines_are_found(refute, monkeypatch):
-    """What waits is dropped at the output of the highlight-cosine unit."""
+    """A beat that is dropped while it waits at the output of the highlight-cosine unit is found."""
 
     def dropping(m, output, valid, payload):
         advance = skid_buffer(m, output, valid, payload)

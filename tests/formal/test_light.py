@@ -16,13 +16,13 @@ pytestmark = pytest.mark.prove
 
 
 def two_bits(light, term):
-    """Of the operand, 0 where it is dark."""
+    """The specular term is the operand, or 0 for a dark beat."""
     yield Value.cast(term).eq(Mux(light.dark, 0, Value.cast(light.operand)[:2]))
 
 
 @pytest.fixture
 def make(monkeypatch):
-    """A light unit with `two_bits` for specular terms, a cycle after the interval."""
+    """A light unit with `two_bits` for specular terms, whose latency is one cycle more than the interval."""
 
     def make(interval):
         stub = short(SpecularUnit, two_bits, interval + 1)
@@ -33,7 +33,7 @@ def make(monkeypatch):
 
 
 def of_light(unit):
-    """Beats of one bit of N.L, its sign, and two of the specular operand."""
+    """Claims on beats with one bit of N.L, its sign, and two bits of the specular operand."""
     h = Harness(unit)
     cosine, highlight = (Value.cast(unit.i.payload[name]) for name in ("cosine", "highlight"))
     step = unit.i.payload.cosine.format.fraction_bits - Diffuse.RESULT_FORMAT.fraction_bits
@@ -53,15 +53,19 @@ def of_light(unit):
 
 
 def test_both_units_move_in_lockstep(prove, make):
-    """Inductive, with an interval of 1: both terms of each beat leave once, in order, 2 cycles on; the
-    specular one 0 where N.L is not above 0; what waits stays; no deadlock."""
+    """By induction, with an interval of 1: both terms of each beat leave once and in order, 2 cycles later.
+
+    The specular term is 0 where N.L is not above 0. A beat that waits does not change, and no beat is stuck.
+    """
     prove(of_light(make(1)))
 
 
 @pytest.mark.parametrize("interval", [2, 3])
 def test_dark_beats_keep_their_places(prove, make, interval):
-    """In 12 cycles, with specular terms every so many: both terms of each beat leave once, in order, the
-    specular one 0 where N.L is not above 0; what waits stays; no deadlock."""
+    """Within 12 cycles, with specular terms in some cycles: both terms of each beat leave once and in order.
+
+    The specular term is 0 where N.L is not above 0. A beat that waits does not change, and no beat is stuck.
+    """
     prove(of_light(make(interval)), 12)
 
 
@@ -85,7 +89,7 @@ BUGS = {
 
 @pytest.mark.parametrize("bug", BUGS)
 def test_bugs_are_found(refute, inject, make, bug):
-    """Injected in `LightUnit`, each refutes the claims."""
+    """Each bug, injected in `LightUnit`, refutes a claim."""
     inject(LightUnit, "_skip", *BUGS[bug])
     refute(of_light(make(2)), 12)
 
@@ -101,6 +105,6 @@ LOCKSTEP_BUGS = {
 
 @pytest.mark.parametrize("bug", LOCKSTEP_BUGS)
 def test_bugs_in_lockstep_are_found(refute, inject, make, bug):
-    """Injected in `LightUnit`, each refutes the claims."""
+    """Each bug, injected in `LightUnit`, refutes a claim."""
     inject(LightUnit, "elaborate", *LOCKSTEP_BUGS[bug])
     refute(of_light(make(1)), 12)

@@ -1,5 +1,6 @@
 # amaranth: UnusedElaboratable=no
-"""Proofs of the lobe unit: argument, address, sum and writes by SAT; its term never rises, by exhaustion."""
+"""Proofs of the lobe unit: SAT proves argument, address, sum and writes; exhaustion proves that its term
+never rises."""
 
 from dataclasses import replace
 from functools import partial
@@ -46,7 +47,7 @@ def registers_of(harness):
 
 
 class OfUnit:
-    """A harness of a unit whose memory is outside, and values as they stood enabled cycles ago."""
+    """A harness of a unit with an outside memory, which gives values of earlier enabled cycles."""
 
     def __init__(self, model):
         self.unit = LobeUnit(model, shares_memory=True)
@@ -58,7 +59,7 @@ class OfUnit:
             self.m.d.sync += self.age.eq(Mux(self.age == 15, 15, self.age + 1))
 
     def before(self, value, cycles=1):
-        """A value so many enabled cycles ago; it means something from that age on."""
+        """The value of some enabled cycles ago. It has a meaning only from this age on."""
         value = Value.cast(value)
         for _ in range(cycles):
             past = Signal(value.shape(), name="past", reset_less=True)
@@ -68,12 +69,13 @@ class OfUnit:
         return value
 
     def claim(self, condition, cycles):
-        """That it holds from that age on."""
+        """Claim a condition from this age on."""
         self.harness.claim((self.age < cycles) | condition)
 
 
 def of_argument(model):
-    """Two cycles on the argument is 1 - N·H, cut, at least 0; 0 for a beat that is dark or not in front."""
+    """Claim that the argument is 1 - N·H two cycles later, cut and at least 0; 0 for a beat that is dark or
+    not in front."""
     h = OfUnit(model)
     bits, beat = model.fraction_bits, h.unit.i.payload
     operand = Value.cast(beat.operand)
@@ -88,9 +90,11 @@ def of_argument(model):
 
 
 def of_address(model):
-    """Three cycles on the memory is asked for the word of the argument's octave and step; the rest is f.
+    """Claim that three cycles later the memory is asked for the word of the argument's octave and step.
 
-    From the definition: row r, from 1 on, has the arguments from ``2^(r-1-E)`` to twice that.
+    The rest is f.
+
+    Row r, from 1 on, has the arguments from ``2^(r-1-E)`` to twice this number.
     """
     p, h = model, OfUnit(model)
     bits, width = p.fraction_bits, p.fraction_bits - 1 - p.step_bits
@@ -103,7 +107,7 @@ def of_address(model):
         h.m.d.sync += [stood.eq(bank), first.eq(0)]
         h.harness.assume((bank < p.banks) & (first | (bank == stood)))
     for row in range(p.rows):
-        # The first bit of the steps' address is under that of the octave's start.
+        # The first bit of the step's address is one bit below the start of the octave.
         top = bits - 1 - p.octaves + max(row, 1)
         inside = argument[top:] == (1 if row else 0)
         step, rest = argument[top - p.step_bits : top], argument[: top - p.step_bits]
@@ -118,10 +122,10 @@ def of_address(model):
 
 
 def of_term(model):
-    """Whatever word with entries in range: the term is the exact sum, which does not wrap.
+    """Claim for any word with entries in range that the term is the exact sum, and does not wrap.
 
-    What the unit keeps of a word is that word. Of what it keeps it is assumed that the entry and the next one
-    are in range; of the product, which is cut, that f is from 0 to under 1.
+    The word in the unit's registers is claimed to be the word of the table. Two facts are assumed: the entry
+    and the next entry are in range, and the cut product has an f of 0 or more and under 1.
     """
     h = OfUnit(model)
     word, kept = h.before(h.unit.table.word), h.words["value_9"]
@@ -140,7 +144,7 @@ def of_term(model):
 
 
 def written(h):
-    """Whether there was a write on the clock before, its value, and whether a bank began with it."""
+    """Whether there was a write in the cycle before, its value, and whether it began a bank."""
     offered = h.unit.write
     write, value, begins = (
         Signal(bits, name=name) for bits, name in ((1, "write"), (17, "came"), (1, "new"))
@@ -157,7 +161,7 @@ def written(h):
 
 
 def of_banks(model):
-    """A word that is written is of the bank whose table began last."""
+    """Claim that a written word belongs to the bank whose table began last."""
     p, unit = model, LobeMemory(model)
     h = Harness(unit)
     bank, (write, value, begins) = Signal(17, name="bank"), written(h)
@@ -174,7 +178,10 @@ def of_banks(model):
 
 
 def of_memory(model):
-    """A word chosen freely is, once its values were written, what they make; no other write changes it."""
+    """Claim on a word that is chosen freely.
+
+    After its values were written it is made from them, and no other write changes it.
+    """
     p, unit = model, LobeMemory(model)
     h = Harness(unit)
     m = h.m
@@ -196,11 +203,11 @@ def of_memory(model):
         m.d.sync += [to.eq(value), count.eq(0), begun.eq(1)]
     with m.Elif(write):
         m.d.sync += [previous.eq(value), count.eq(Mux(count > p.entries, count, count + 1))]
-        # Nothing is known of a table that has not begun; at power-up none has.
+        # Only a table that has begun is known. At power-up no table has begun.
         with m.If((to == own_bank) & (count == own_entry + 1) & begun & chosen):
             difference = (value - previous)[:18]
             m.d.sync += [word.eq(Cat(previous, difference)), known.eq(1)]
-    # Two clocks with enable, on neither of which a word is written.
+    # Two cycles with enable, without a write of a word in either.
     asked, answer = Signal(2, name="asked"), Signal(35, name="answer")
     read, wrote = unit.reads[0], Signal(name="wrote")
     moves = read.enable & ~write & ~wrote
@@ -215,12 +222,13 @@ def of_memory(model):
 
 @pytest.mark.parametrize("interval", [1, 3])
 def test_beats(prove, interval):
-    """Inductive: what waits stays, a beat has a place for every cycle of the latency, none is stuck."""
+    """By induction: a beat that waits does not change, there is room for a beat a cycle, and no beat is
+    stuck."""
     make = partial(LobeUnit, Lobe(), interval, shares_memory=True)
     unit = make()
     harness = Harness(unit)
     stays(harness, unit.o)
-    # What a memory answers stays where it does not read.
+    # An answer of the memory stays while the memory does not read.
     kept, reads = Signal.like(unit.table.word, name="kept"), Signal(name="reads", init=1)
     harness.m.d.sync += [kept.eq(unit.table.word), reads.eq(unit.table.enable)]
     harness.assume(reads | (unit.table.word == kept))
@@ -231,30 +239,30 @@ def test_beats(prove, interval):
 @pytest.mark.parametrize("operand", OPERANDS)
 @pytest.mark.parametrize("fraction_bits", [25, 34])
 def test_argument(prove, fraction_bits, operand):
-    """Inductive, for every operand: nothing wraps, and what is not in front is dark."""
+    """By induction, for every operand: no word wraps, and a beat that is not in front is dark."""
     prove(of_argument(Lobe(operand=operand, fraction_bits=fraction_bits)))
 
 
 @pytest.mark.parametrize("banks", [1, 3])
 @pytest.mark.parametrize(("octaves", "steps", "fraction_bits"), SIZES)
 def test_address(prove, octaves, steps, fraction_bits, banks):
-    """Inductive, for every argument: the word and the fraction that its definition says, of the bank."""
+    """By induction, for every argument: word and fraction are those of the definition, in the right bank."""
     prove(of_address(Lobe(BLINN, CHORD, octaves, steps, banks, fraction_bits)))
 
 
 def test_term(prove):
-    """Inductive, for every word: the sum does not wrap, and no term passes the next entry."""
+    """By induction, for every word: the sum does not wrap, and no term passes the next entry."""
     prove(of_term(Lobe(operand=CHORD)))
 
 
 @pytest.mark.parametrize("banks", [1, 3, 4])
 def test_writes_stay_in_their_bank(prove, banks):
-    """Inductive, for every sequence of writes."""
+    """By induction, for every sequence of writes."""
     prove(of_banks(replace(LOBE, banks=banks)))
 
 
 def test_loaded_words(prove):
-    """Inductive, for every sequence of writes: each word is that of the last values written to it."""
+    """By induction, for every sequence of writes: each word follows from the last values written to it."""
     prove(of_memory(SMALL))
 
 
@@ -264,7 +272,8 @@ def test_loaded_words(prove):
     [*((BLINN, n) for n in (1, 2, 37, 1000)), (BECKMANN, 0.3), (GGX, 0.05), (GGX, 1), (COPLANAR_PHONG, 30)],
 )
 def test_term_never_rises(model, parameter, operand):
-    """Both ends of every word, a thousand fractions of each tenth, and past the end, where it is 0."""
+    """Arguments: both ends of every word, a thousand fractions of every tenth word, and some past the end,
+    where the term is 0."""
     p = Lobe(model, operand)
     table = p.table(parameter)
     unit = LobeUnit(p, tables=[table])
@@ -385,7 +394,7 @@ BUGS = {
 
 @pytest.mark.parametrize("bug", BUGS)
 def test_bugs_are_found(refute, inject, bug):
-    """Injected into the unit, each refutes a claim."""
+    """Each bug, injected in the unit, refutes a claim."""
     claim, *change = BUGS[bug]
     inject(*change)
     model = Lobe(operand="cosine", banks=3, octaves=6, steps=4)

@@ -1,4 +1,5 @@
-"""Proofs of the pipeline: spans go to all that take them or to none, constants stay under a running span."""
+"""Proofs of the pipeline: a span goes to all of its sinks or to none; constants do not change while a span is
+inside."""
 
 import pytest
 from amaranth.hdl import Cat, Const, Module, Mux, Signal, Value
@@ -31,7 +32,7 @@ NARROW = {"x_bits": 2, "y_bits": 1, "length_bits": 2}
 
 
 class Line(InterpolatorUnit):
-    """In the interpolator's place: two bits of the left normal, one more for each pixel and light."""
+    """A stub of the interpolator: two bits of the left normal, plus 1 for each pixel and each light."""
 
     latency = 1
 
@@ -75,15 +76,16 @@ def decisions(span, lit):
 
 @pytest.fixture
 def stubs(monkeypatch):
-    """A pipeline with three places, a `Line`, and units of a clock or two that hand its codes on."""
+    """Make a pipeline with room for three spans, a `Line`, and units of one or two cycles that pass on
+    codes."""
 
     def pipeline(model, style="throughput"):
         interval = 2 if style == "compact" else 1
-        # Longer than that of a dark beat, so that the lights are not in step.
+        # Longer than the interval of a dark beat, so that the lights do not move in the same cycles.
         longer = 3 if style == "compact" else 1
         units = (
             (blysk.hdl.pixel_shading, DiffuseUnit, diffuse, 1, 1),
-            # A light unit builds it for the latency of its specular unit.
+            # A light unit builds this unit with the latency of its specular unit.
             (blysk.hdl.lighting.light, DiffuseUnit, diffuse, 2, 1),
             (blysk.hdl.lighting.light, SpecularUnit, specular, 2, longer),
             (blysk.hdl.lighting.colored_intensity, IntensityUnit, colors, interval, interval),
@@ -101,10 +103,10 @@ def stubs(monkeypatch):
 
 
 def of_writes(model):
-    """Spans inside are those taken in whose last pixel has not left.
+    """Claims on writes. A span is inside from its admission until its last pixel leaves.
 
-    Assumed, as `of_waiting_spans` and the proofs of the assembler have it: a last pixel leaves only while a
-    span is inside, and there are at most as many as the FIFO of coordinates and the assembler hold.
+    Two facts are assumed that `of_waiting_spans` and the proofs of the assembler show. A last pixel leaves
+    only while a span is inside. The FIFO of coordinates and the assembler limit the number of spans.
     """
     h = Harness(unit := ShadingPipelineUnit(model))
     inside = Signal(6)
@@ -115,14 +117,14 @@ def of_writes(model):
     h.assume(inside <= unit._waiting_spans + unit._assembler.SPANS_INSIDE)
     h.claim(unit.write.ready == ~inside.any())
     h.claim(~(taken(unit.write) & taken(unit.i)))
-    # What makes it inductive.
+    # This claim makes the proof inductive.
     counted = h.register("inside") + h.register("came") - h.register("went")
     h.claim((counted == inside) & (h.register("idle") == ~inside.any()))
     return h
 
 
 def of_constants():
-    """Without lights: a pixel's colour is that of the last write before its span was taken in."""
+    """Claim without lights: a pixel's colour is that of the last write before its span was taken."""
     h = Harness(unit := ShadingPipelineUnit(preset(model="cosquad", lights=0, grey=True, **NARROW)))
     ambient, (address, _) = Signal(17), FIELDS_OF_A_FRAME["ambient"]
     write = unit.write.payload
@@ -134,10 +136,10 @@ def of_constants():
 
 
 def of_waiting_spans(unit, late):
-    """Pixels, and spans that the interpolator takes; what is due comes in so many cycles.
+    """Claims on pixels, on spans that the interpolator takes, and on the time until an answer.
 
-    No span is taken while a write or another span is offered, and a pixel leaves until that is taken: so it
-    is, in the end.
+    No span is taken while a write is offered, and no write while a span is inside. Until the span or the
+    write is taken, pixels leave. So it is taken in the end.
     """
     h = Harness(unit)
     span, model = unit.i.payload, unit.model
@@ -180,16 +182,17 @@ TWO_LIGHTS = preset(method="linear", model="cosquad", exponent=10, grey=True, li
 
 @pytest.mark.parametrize("model", [AMBIENT, LINEAR, GATED], ids=["ambient", "linear", "gated"])
 def test_writes_wait_for_spans(prove, model):
-    """Inductive: a write is taken as soon as no span is inside, not before, nor beside one that comes."""
+    """By induction: a write is taken exactly when no span is inside, and never together with a span."""
     prove(of_writes(model))
 
 
 def test_constants_stay(prove):
-    """In 16 cycles, one channel: each pixel has the colour of the last write before its span was taken in."""
+    """In 16 cycles with one channel: each pixel has the colour of the last write before its span was
+    taken."""
     prove(of_constants(), 16)
 
 
-# Cycles that the output, ready, waits at most, and cycles of the proof.
+# For each pipeline: the most cycles that a ready output waits, and the cycles of the proof.
 PIPELINES = {
     "ambient": (AMBIENT, "throughput", 6, 14),
     "diffuse": (LINEAR, "throughput", 6, 16),
@@ -202,9 +205,13 @@ PIPELINES = {
 
 @pytest.mark.parametrize("name", PIPELINES)
 def test_pixels(prove, stubs, name):
-    """In so many cycles, spans of 0 to 3 pixels, with `stubs`: every span that is taken in goes to the
-    interpolator and to the places round it, so that its pixels leave in order, each once, each at its place
-    and of its colour, the last of them marked; what is due comes, a waiting write too."""
+    """Within some cycles, for spans of 0 to 3 pixels and with `stubs`: all pixels leave in order and once
+    each.
+
+    Every span that is taken goes to the interpolator and to all units beside it. So each pixel has its
+    position and its colour, and the last pixel of a span is marked. Every answer comes in time, also that to
+    a waiting write.
+    """
     *pipeline, late, cycles = PIPELINES[name]
     prove(of_waiting_spans(stubs(*pipeline), late), cycles)
 
@@ -247,7 +254,7 @@ BUGS = {
 
 @pytest.mark.parametrize("bug", BUGS)
 def test_bugs_are_found(refute, inject, stubs, bug):
-    """Injected in the pipeline or its shading, each refutes the claims, in the cycles of the proof."""
+    """Each bug, injected in the pipeline or its shading, refutes a claim within the cycles of the proof."""
     name, *change = BUGS[bug]
     *pipeline, late, cycles = PIPELINES[name]
     inject(PixelShading if change[0] == "_connect_lights" else ShadingPipelineUnit, *change)
@@ -265,7 +272,7 @@ WRITE_BUGS = {
 
 @pytest.mark.parametrize("bug", WRITE_BUGS)
 def test_bugs_of_writes_are_found(refute, inject, bug):
-    """Injected in `ShadingPipelineUnit`, each refutes the claims on writes."""
+    """Each bug, injected in `ShadingPipelineUnit`, refutes a claim on writes."""
     inject(ShadingPipelineUnit, "_admit", *WRITE_BUGS[bug])
     refute(of_writes(AMBIENT), 20)
 
@@ -288,7 +295,7 @@ CONSTANT_BUGS = {
 
 @pytest.mark.parametrize("bug", CONSTANT_BUGS)
 def test_bugs_of_constants_are_found(refute, inject, bug):
-    """Injected in the pipeline or behind its write port, each refutes the claim on colours."""
+    """Each bug, injected in the pipeline or behind its write port, refutes the claim on colours."""
     owner, *change = CONSTANT_BUGS[bug]
     inject(owner, *change)
     refute(of_constants(), 16)

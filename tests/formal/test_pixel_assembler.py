@@ -1,4 +1,4 @@
-"""Proofs of the pixel assembler: every colour gets its place, and every span all its pixels."""
+"""Proofs of the pixel assembler: every colour gets its position, and every span gets all of its pixels."""
 
 import pytest
 from amaranth.hdl import Cat, Signal
@@ -12,7 +12,7 @@ pytestmark = pytest.mark.prove
 
 
 def of_waiting_spans():
-    """Coordinates and lengths of 2 bits: spans of 1 to 3 pixels, which run past the largest column, too."""
+    """Coordinates and lengths have 2 bits: spans of 1 to 3 pixels, which also run past the largest column."""
     unit = PixelAssemblerUnit(2, 1, 2)
     h = Harness(unit)
     h.assume(unit.coordinates.payload.length != 0)
@@ -21,7 +21,7 @@ def of_waiting_spans():
         return (pixel.x == (span.x + place)[:2]) & (pixel.y == span.y) & (pixel.last == last)
 
     stays(h, unit.o)
-    # Two places wait, one is told of, and the pixels of two more.
+    # Largest number of pixels inside: of three spans, and two further pixels.
     owed = pixels_follow(h, unit.coordinates, unit.o, unit.coordinates.payload.length, 4 * 3 + 2, image)
     # Spans whose last pixel has not left.
     spans = Signal(range(unit.SPANS_INSIDE + 2))
@@ -33,7 +33,7 @@ def of_waiting_spans():
 
 
 def of_progress():
-    """The same spans, counted alone, while colours are offered and the output is ready."""
+    """Count the same spans while colours are offered and the output is ready."""
     unit = PixelAssemblerUnit(2, 1, 2)
     h = Harness(unit)
     h.assume(unit.coordinates.payload.length != 0)
@@ -45,7 +45,10 @@ def of_progress():
 
 
 def of_colors():
-    """Colours of one bit a channel: the first of red, green and blue is free, the others are its."""
+    """Claim on colours of one bit a channel.
+
+    The first of red, green and blue is free; the others follow from it.
+    """
     unit = PixelAssemblerUnit(1, 1, 2)
     h = Harness(unit)
     color = unit.colors.payload
@@ -56,13 +59,14 @@ def of_colors():
     def image(came, leaves):
         return Cat(came[name] for name in "rgb") == Cat(leaves[name] for name in "rgb")
 
-    # One in the register for the pixel, and one that waits.
+    # One pixel is in the register, and one waits.
     follows(h, unit.colors, unit.o, 2, image)
     return h
 
 
 def test_waiting_spans(prove):
-    """Inductive: a span's pixels leave in order, from x on, modulo 2^x_bits, with y, the last of them marked.
+    """By induction: a span's pixels leave in order from x on, modulo 2^x_bits, with y; the last pixel is
+    marked.
 
     At most `PixelAssemblerUnit.SPANS_INSIDE` spans are inside.
     """
@@ -70,13 +74,15 @@ def test_waiting_spans(prove):
 
 
 def test_progress(prove):
-    """Inductive: with colours offered and the output ready, a pixel leaves every 3 cycles at the latest, and
-    a place is taken in 5: the pixels of a span, and two registers."""
+    """By induction: while colours are offered and the output is ready, pixels leave at most 3 cycles apart.
+
+    A span's position is taken within 5 cycles: the pixels of a span, and two registers.
+    """
     prove(of_progress())
 
 
 def test_colors(prove):
-    """Inductive: each colour leaves once, in order, with a pixel; at most two are inside."""
+    """By induction: each colour leaves once and in order, with a pixel; at most two colours are inside."""
     prove(of_colors())
 
 
@@ -102,7 +108,7 @@ BUGS = {
 
 @pytest.mark.parametrize("bug", BUGS)
 def test_bugs_are_found(refute, inject, bug):
-    """Injected in `PixelAssemblerUnit`, each refutes the claims on places, on progress or on colours."""
+    """Each bug, injected in `PixelAssemblerUnit`, refutes a claim on positions, progress or colours."""
     claims, *change = BUGS[bug]
     inject(PixelAssemblerUnit, "elaborate", *change)
     refute(claims(), 20)

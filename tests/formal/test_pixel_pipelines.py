@@ -1,4 +1,4 @@
-"""Proof about several pipelines with wide beats; `test_units` has that of the merged stream."""
+"""Proof about several pipelines with a wide beat; `test_units` proves the merged stream."""
 
 import pytest
 
@@ -13,7 +13,7 @@ pytestmark = pytest.mark.prove
 
 
 def test_wide_beats_that_wait_stay(prove):
-    """Inductive: no lane gets a pixel while the beat of the others waits."""
+    """By induction: no lane gets a pixel while the beat of the other lanes waits."""
     design = preset(model="cosquad", lights=0, x_bits=4, y_bits=2, length_bits=2, grey=True)
     unit = WidePipelinesUnit(PixelPipelines(design.built(pipes=2)), 4)
     harness = Harness(unit)

@@ -1,4 +1,4 @@
-"""Proofs of the exact power unit: how far its term may rise as the cosine falls, and where it is 0."""
+"""Proofs of the exact power unit: how far its term may rise while the cosine falls, and where it is 0."""
 
 import numpy as np
 import pytest
@@ -17,30 +17,33 @@ pytestmark = [pytest.mark.prove, pytest.mark.seldom]
 
 EXPONENTS = range(1, MAX_EXPONENT + 1)
 
-# Up to 4 million arguments give light; of lower exponents it is up to 33 million each, minutes in all.
+# Up to 4 million arguments give light. At lower exponents up to 33 million do, which would take minutes.
 EXHAUSTED = sorted({*(2**k + step for k in range(7, 10) for step in (-1, 0, 1)), 100, 777, 999, 1000})
 
 RISE = 5
-"""Steps of the result: together under a hundredth of a step of an 8-bit channel, at intensity 1."""
+"""Largest rise, in steps of the result. It is under 0.01 steps of an 8-bit channel at intensity 1."""
 
 
 def last_lit(exponent):
-    """``1 - cos gamma`` of which the power is a step of the result: beyond it no term is over 0."""
+    """``1 - cos gamma`` at which the power is a step of the result. Beyond it no term is over 0."""
     return -np.expm1(np.log(Power.RESULT_FORMAT.step) / exponent)
 
 
 def shortfall(low, high, exponent):
-    """Steps by which a term may be under the exact one, before the last cut; 1 - cos from low to high.
+    """Bound of the steps by which a term may be under the exact term, before the last cut; 1 - cos from low
+    to high.
 
-    Of words p and q, whose factors are cut, an operation makes ``p + q - p q`` and less than ``c (p + q)``
-    more, c a step of the factors. All of this grows with p and q. So no word x or s is under the exact one,
-    x° or s°, nor over what x^ and s^ get that have ``c (p + q)`` more every time; their distances
+    An operation takes words p and q, whose factors are cut. It makes ``p + q - p q`` and up to ``c (p + q)``
+    more, where c is a step of the factors. Both grow with p and q. So no word x or s is under its exact value
+    x° or s°. Let x^ and s^ be the words with the whole ``c (p + q)`` in every operation; no word is over
+    them. The distances
 
-        ``x^ - x°  <-  (x^ - x°) (2 - x^ - x°) + 2 c x^``
-        ``s^ - s°  <-  (s^ - s°) (1 - x°) + (x^ - x°) (1 - s^) + c (s^ + x^)``
+        ``x^ - x° <- (x^ - x°) (2 - x^ - x°) + 2 c x^``
 
-    are sums of what is not negative, so that each factor's larger end bounds them. Saturation only lowers
-    words; one that is used makes the term 0.
+        ``s^ - s° <- (s^ - s°) (1 - x°) + (x^ - x°) (1 - s^) + c (s^ + x^)``
+
+    are sums of numbers that are not negative. So the larger end of each factor bounds them. Saturation only
+    lowers words. If a saturated word is used, the term is 0.
     """
     cut = Power.FACTOR_FORMAT.step
     exact = most = np.array([low, high])
@@ -58,7 +61,10 @@ def shortfall(low, high, exponent):
 
 
 def of_shortfall(exponent):
-    """It is under `RISE` steps where there is light; what is left is for float64 and ``1 - 2^-34`` for 1."""
+    """The bound is under `RISE` steps where there is light.
+
+    The rest is for float64, and for ``1 - 2^-34`` in place of 1.
+    """
     edges = -np.expm1(np.linspace(0, np.log(Power.RESULT_FORMAT.step), 65) / exponent)
     low, high = edges[:-1], edges[1:]
     for _ in range(10):
@@ -72,7 +78,10 @@ def of_shortfall(exponent):
 
 
 def check(unit, exponent, codes):
-    """Largest rise in steps, of arguments that never fall; it and each term keep the bounds of `RISE`."""
+    """Largest rise in steps, for arguments that never fall.
+
+    The rise and each term keep the bounds of `RISE`.
+    """
     run = simulate(
         unit,
         {"operand": codes, "dark": np.zeros(len(codes), dtype=np.uint8)},
@@ -91,13 +100,14 @@ def check(unit, exponent, codes):
 
 
 def every_argument(exponent):
-    """All up to the last that gives light, then some."""
+    """All arguments up to the last that gives light, and some beyond."""
     end, last = int(last_lit(exponent) * 2.0**25) + 2, Power.ARGUMENT_FORMAT.max_code
     return np.r_[np.arange(end), np.linspace(end, last, 1000).astype(np.int64)]
 
 
 def some_cosines(exponent):
-    """At random where there is light and next to where a factor changes; both ends of the word."""
+    """Random arguments where there is light, arguments next to a change of a factor, and both ends of the
+    word."""
     rng = np.random.default_rng(exponent)
     x = np.r_[rng.uniform(0, last_lit(exponent), 1000), rng.uniform(0, 2, 50)]
     codes = (x * 2.0**34).astype(np.int64)
@@ -113,21 +123,23 @@ def of_power(operand):
 
 @pytest.mark.parametrize("operand", OPERANDS)
 def test_term_follows_from_the_argument(prove, operand):
-    """Inductive, for every operand: ``1 - cos gamma``, limited, is all that a term is made of.
+    """By induction, for every operand: a term depends only on the limited ``1 - cos gamma``.
 
-    A dark beat has the largest argument, as 1 - cos gamma of 1 and more.
+    A dark beat has the largest argument, like a 1 - cos gamma of 1 and more.
     """
     reads_one_word(PowerUnit(Power(operand)), "x_0")
     prove(of_power(operand))
 
 
 def test_term_rises_by_five_steps_at_most():
-    """For every argument of 34 bits and every exponent, by bounds.
+    """For every argument of 34 bits and every exponent, by bounds: a term rises by at most `RISE` steps.
 
-    A term is never over the exact one, cut to 17 bits, and at most `RISE` steps under that, which falls with
-    the argument. So it is at most `RISE` steps over any term of a smaller argument. Why it rises at all: of
-    ``p + q - p q`` the sum has 34 bits, the product has 17 of each factor. Where a factor takes its next
-    code, the product grows by up to two of its steps at once and the sum by 2^-34.
+    A term is never over the exact term, cut to 17 bits, and at most `RISE` steps under it. The exact term
+    falls as the argument rises. So a term is at most `RISE` steps over any term of a smaller argument.
+
+    A term rises at all because the sum of ``p + q - p q`` has 34 bits, and the product has 17 bits of each
+    factor. Where a factor goes to its next code, the product grows by up to two of its steps, and the sum by
+    2^-34.
     """
     for exponent in EXPONENTS:
         of_shortfall(exponent)
@@ -136,21 +148,21 @@ def test_term_rises_by_five_steps_at_most():
 
 
 def test_term_rises_by_three_steps_at_every_argument():
-    """Exhaustion of 1 - cos gamma for `EXHAUSTED`, in the unit: 2 or 3 steps."""
+    """Exhaustion of 1 - cos gamma in the unit, for the exponents `EXHAUSTED`: terms rise by 2 or 3 steps."""
     unit = PowerUnit(Power("one_minus_cosine"))
     rises = [check(unit, exponent, every_argument(exponent)) for exponent in EXHAUSTED]
     assert set(rises) == {2, 3}
 
 
 def test_term_of_a_cosine_keeps_the_bounds():
-    """Every exponent, at some arguments of 34 bits, in the unit."""
+    """Some arguments of 34 bits in the unit, at every exponent."""
     unit = PowerUnit(Power("cosine"))
     for exponent in EXPONENTS:
         check(unit, exponent, some_cosines(exponent))
 
 
 def of_darkness(operand):
-    """Dark beats at the peak, and arguments of 1 and more: each is as good as any, by `of_argument`."""
+    """Dark beats at the peak, and arguments of 1 and more. By `of_argument` a few of each are enough."""
     unit = PowerUnit(Power(operand))
     peak, end = 0, 1 << 25
     if operand == "cosine":
@@ -162,7 +174,7 @@ def of_darkness(operand):
 
 
 def of_cosines_to_0():
-    """At n = 1 a cosine of 0 and less has a term of one step to -2^-17, then 0."""
+    """At n = 1 a cosine from 0 down to -2^-17 has a term of one step; for smaller cosines the term is 0."""
     codes = -np.arange(1 << 18)
     beats = {"operand": codes, "dark": np.zeros(len(codes), dtype=np.uint8)}
     run = simulate(PowerUnit(Power("cosine")), beats, count=len(codes), constants={"exponent": 1})
@@ -171,14 +183,15 @@ def of_cosines_to_0():
 
 @pytest.mark.parametrize("operand", OPERANDS)
 def test_term_is_0_in_the_dark(operand):
-    """Every exponent, and every beat that is dark or has an argument of 1 or more."""
+    """The term is 0 for every exponent and every beat that is dark or has an argument of 1 or more."""
     of_darkness(operand)
 
 
 def test_term_is_0_where_the_cosine_is_not_over_0():
-    """But at n = 1, next to 0: ``1 - cos gamma`` is from the 1 of unit vectors, which is 2^-16 less.
+    """The exception is n = 1 next to 0, because ``1 - cos gamma`` is relative to unit vectors, 2^-16 less
+    than 1.
 
-    At every other exponent the exact term of such an argument is under a step, and no term is over that.
+    At every other exponent the exact term of this argument is under a step, and no term is over it.
     """
     of_cosines_to_0()
     assert (1 - ONE_SQUARED.values) ** 2 < Power.RESULT_FORMAT.step
@@ -193,14 +206,14 @@ BUGS_OF_ARGUMENT = {
 
 @pytest.mark.parametrize("bug", BUGS_OF_ARGUMENT)
 def test_bugs_of_the_argument_are_found(refute, inject, bug):
-    """Injected in the unit, each refutes the claims."""
+    """Each bug, injected in the unit, refutes a claim."""
     name, *change = BUGS_OF_ARGUMENT[bug]
     inject(blysk.hdl.lighting.power if name == "one_minus" else PowerUnit, name, *change)
     refute(of_power("cosine"), 4)
 
 
 def test_bug_of_the_bounds_is_found(monkeypatch):
-    """Factors of a bit less."""
+    """Factors with a bit less are found."""
     monkeypatch.setattr(Power, "FACTOR_FORMAT", UQ(0, 16))
     with pytest.raises(AssertionError, match=r"^terms may be 5 steps too small at exponent 513$"):
         of_shortfall(513)
@@ -208,14 +221,14 @@ def test_bug_of_the_bounds_is_found(monkeypatch):
 
 @pytest.mark.parametrize("operand", OPERANDS)
 def test_bug_of_the_dark_is_found(inject, operand):
-    """That of a dark beat is the term it would have."""
+    """A dark beat that gets the term of its cosine is found."""
     inject(PowerUnit, "datapath", "Mux(dark, ", "Mux(0, ")
     with pytest.raises(AssertionError):
         of_darkness(operand)
 
 
 def test_bug_of_cosines_to_0_is_found(inject):
-    """1 is not that of unit vectors."""
+    """A 1 that is not that of unit vectors is found."""
     inject(blysk.hdl.lighting.power, "one_minus", "ONE_SQUARED.values.item()", "1")
     with pytest.raises(AssertionError):
         of_cosines_to_0()
@@ -246,7 +259,7 @@ BUGS = {
 
 @pytest.mark.parametrize("bug", BUGS)
 def test_bugs_are_found(inject, bug):
-    """Injected in the unit, each breaks a bound."""
+    """Each bug, injected in the unit, breaks a bound."""
     *change, claim = BUGS[bug]
     inject(PowerUnit, *change)
     with pytest.raises(AssertionError, match=f"^{claim}"):
