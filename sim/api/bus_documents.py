@@ -53,7 +53,7 @@ def frame_text(core: ShadingPipelineUnit | RendererUnit | GeometryUnit) -> str:
 
 
 def _values(unit: BusUnit, field: Field) -> str:
-    """Number format of a field. For a vector N/W also the frame of its axes."""
+    """Number format of a field. If the field holds a vector N/W, also the frame of the vector's axes."""
     frame = frame_text(unit.framing.core)
     return f"{field.values}; N/W {frame}" if field.name in _IN_FRAME and frame else field.values
 

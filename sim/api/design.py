@@ -99,8 +99,8 @@ def design_of(settings: Settings, lights: int, materials: int = 1) -> costed_des
     method = settings["method"]
     if settings["model"] in MIRROR_LOBES and not (METHODS | PUBLISHED)[method].serves_mirror:
         remedy = (
-            "use method quotient; or phong_coplanar, which is exact where N, L and V lie in a plane, and 11 "
-            "LSB of linear light off on the default teapot"
+            "use method quotient; or phong_coplanar, which is exact where N, L and V lie in a plane. On the "
+            "default teapot phong_coplanar is 11 LSB of linear light off"
         )
         raise settings.refuse("model", f"method {method} finds N.H, not R.V", remedy)
     if settings["gate"] and not (METHODS | PUBLISHED)[method].serves_gate:

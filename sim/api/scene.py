@@ -201,7 +201,7 @@ def _without(loaded: LoadedMesh, albedo: bool, cutoffs: bool) -> LoadedMesh:
 
 
 def scenes_of(loaded: LoadedMesh, settings: Settings, count: int = 1) -> list[Scene]:
-    """The scene of a mesh, or the scenes of a turntable, which differ only in the camera.
+    """Scenes of a mesh: a single scene, or the scenes of a turntable. They differ only in the camera.
 
     Parameters
     ----------

@@ -30,7 +30,7 @@ from blysk.sim.errors import OptionError
 
 __all__ = ["ShadingUnit", "header_of", "verilog", "verilog_and_unit"]
 
-_LIMIT = "2048 sin(a / 2), rounded down, for spans of at most the angle a"
+_LIMIT = "2048 sin(a / 2), rounded down; spans with an angle over a are cut"
 _FORMATS = "SQ(i, f): two's complement, i + f bits, value = code / 2^f; UQ(i, f): the same without a sign"
 
 ShadingUnit = ShadingPipelineUnit | PixelPipelinesUnit | MergedPipelinesUnit
@@ -128,7 +128,7 @@ def _render_header(unit: RendererUnit) -> list[str]:
         *_geometry_lines(unit.geometry),
         *_axes_lines(unit.model),
         *_coarse_lines(unit),
-        "memory_*: a depth for each pixel; read data comes a clock after the place; before a picture's first "
+        "memory_*: a depth for each pixel; read data comes a clock after its place; before a picture's first "
         "pixel the core writes all ones to every pixel of the picture, a pixel a clock",
         "constants_picture: change it for each picture, to clear the depths as after rst; without a change "
         "triangles add to the picture",
@@ -142,8 +142,8 @@ def _axes_lines(renderer: Renderer) -> list[str]:
     return [
         "With several lights no vertex normal may be longer than 1, before it is multiplied by 1/W.",
         f"axes of light k, from 1 on: {', '.join(renderer.axes)} of its frame, each as its dot products with",
-        "x, y and z of light 0's frame, times 2^17, rounded, at most 2^17 - 1; write them before the first "
-        "triangle of a frame",
+        "x, y and z of light 0's frame; a dot product times 2^17, rounded, at most 2^17 - 1; write the axes "
+        "before the first triangle of a frame",
     ]
 
 
@@ -160,7 +160,7 @@ def _coarse_lines(unit: RendererUnit) -> list[str]:
 def _geometry_lines(geometry: GeometryUnit) -> list[str]:
     """Description of the input of a core from triangles to spans."""
     grid = geometry.grid
-    spans = "their true lines, uncut" if geometry.lines else "two unit normals, wide spans cut"
+    spans = "their true lines, uncut" if geometry.lines else "two unit normals, spans of a wide angle cut"
     normal, limit = "vertex normal", "is not read" if geometry.lines else _LIMIT
     if geometry.vectors:
         spans, limit = "N/W and its step, cut where N/W grows short", "is not read"

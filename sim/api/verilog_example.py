@@ -67,8 +67,8 @@ def _table_lines(lobe: Lobe, table: list[int]) -> list[str]:
     if lobe.parts == 2:
         half = lobe.entries // 2
         parts = [
-            f"  these are {half} values; then {half} values of S as a function of c = (N.H)^2 in place of s, "
-            "from c = 0 on; last c = 1"
+            f"  these are {half} values; then {half} values of S as a function of c = (N.H)^2, in the same "
+            "rows and steps; last c = 1"
         ]
     return [
         f"Table, {len(table)} writes to address {LOBE_ADDRESS} in this order: 2^17 + bank, then "
@@ -78,7 +78,7 @@ def _table_lines(lobe: Lobe, table: list[int]) -> list[str]:
         + ("" if parts else f"; last {operand} = 1"),
         *parts,
         "  each rounded to the nearest; between two values the highlight is a straight line. The values "
-        "of the example are moved by half the error of this line, which halves the error; plain S also works",
+        "of the example are moved by half the error of this line. This halves the error; plain S also works",
         f"  of the example: {', '.join(map(str, table[:6]))}, ..., {', '.join(map(str, table[-4:]))}; entry "
         f"{lobe.entries // 2}: {table[1 + lobe.entries // 2]}",
     ]

@@ -140,7 +140,7 @@ def _noted(note: Path) -> str:
 
 
 def _key(netlist: str, driver: str, compiler: Compiler) -> str:
-    """Key of a compiled model, a hash; ``netlist`` is the netlist's hash, ``driver`` the driver's text."""
+    """Key of a compiled model: a hash. ``netlist`` is the hash of the netlist, and ``driver`` is a text."""
     parts = (
         netlist,
         SCRIPT,

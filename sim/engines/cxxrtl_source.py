@@ -30,7 +30,8 @@ __all__ = [
     "text_of",
 ]
 
-# No `opt`, nor `opt_clean`: they make wires of registers and combinational fields, which CXXRTL would buffer.
+# The script has no `opt` and no `opt_clean`. Both join registers and combinational fields to wires, which
+# CXXRTL would buffer.
 SCRIPT = "hierarchy -auto-top; proc; flatten; write_cxxrtl -O6 -g0"
 
 
@@ -100,7 +101,8 @@ def generated(netlist: str) -> str:
         ):
             raise SimulationError(
                 f"Yosys: {str(warning.message).strip()} A combinational signal depends on itself, "
-                "or one field of a structure on another: give each its own signal, or use the engine pysim"
+                "or a field of a structure depends on another field: give each field its own signal, or use "
+                "the engine pysim"
             )
     return plain_words(group_registers(read_parts(text)))
 

@@ -48,8 +48,8 @@ class Expression(NamedTuple):
     - ``low``: simpler C++ of a word with the lowest 64 bits.
     - ``among``: a word and a mask. The expression is not 0 if, and only if, bit k of the mask is set, where k
       is the value of the word.
-    - ``bits``: a variable, and the last and first of some of its bits. The expression equals these bits.
-      An expression of 1 bit that has several bits here is 1 if any of these bits is 1.
+    - ``bits``: a variable, and the last and first of some of its bits. The expression equals these bits. If
+      the expression has only 1 bit and they are several, it equals their OR.
     - ``zeros``: a variable, last and first bit, and a number. The expression is the count of leading zeros of
       these bits plus the number.
     """

@@ -144,7 +144,7 @@ def read_parts(text: str) -> str:
 
 
 def _late(lines: list[str]) -> list[str]:
-    """Move the status, and local words that only it needs, under a test for no clock edge."""
+    """Move the status, and local words that only the status needs, under a test for no clock edge."""
     local = {match[1] for line in lines if (match := _LOCAL.fullmatch(line))}
     assignments = {k: match for k, line in enumerate(lines) if (match := _ASSIGNMENT.fullmatch(line))}
     late, readers = {"p_status"}, defaultdict(set)

@@ -148,9 +148,10 @@ def _words(registers: Sequence[Value]) -> Iterator[tuple[Value, int]]:
 
 
 class _Ones(Elaboratable):
-    """For each byte of a word, the number of bits that differ from the cycle before, in the same byte.
+    """Counter of the bits of a word that changed since the cycle before, for each byte.
 
-    It is a module of its own, so that an event-driven engine evaluates little again after a change.
+    Each byte of ``bytes`` counts the bits that differ in the same byte of the word. The counter is a module
+    of its own, so that an event-driven engine evaluates little again after a change.
     """
 
     # Neighbouring fields of 1, then 2, then 4 bits are added.

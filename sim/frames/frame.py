@@ -112,9 +112,10 @@ def attribute_beats(layout: data.StructLayout, attributes: SpanAttributes) -> np
 
 
 def _in_order(beats: np.ndarray, y: np.ndarray) -> np.ndarray:
-    """Pixels of beats with several pixels each, in the order of a single pipeline; ``y``: their scanlines.
+    """Pixels of beats that hold several pixels, put into the order of a single pipeline.
 
-    Within a scanline both orders follow the order of the spans.
+    ``y`` has the scanline of each pixel in this order. Within a scanline both orders follow the order of the
+    spans.
     """
     lanes = beats["pixels"].shape[1]
     pixels = beats["pixels"][(beats["present"][:, np.newaxis] >> np.arange(lanes) & 1).astype(bool)]

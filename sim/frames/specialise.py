@@ -222,7 +222,7 @@ def _with_fixed_values(
     constants: Sequence[FrameConstants],
     reductions: Sequence[Reduction],
 ) -> list[Reduction]:
-    """Reductions by fixed values: exponent or tables, if there is specular light, and grey colours."""
+    """Reductions by fixed values: exponent or tables (only with specular light), and grey colours."""
     found = []
     exponents = {of.exponent for of in constants}
     has_specular = all(reduction.changes.get("specular", 0) is not None for reduction in reductions)

@@ -1,4 +1,4 @@
-"""A folder for users of the Verilog: a cocotb test bench, and the vectors of a frame."""
+"""A folder for users of the Verilog: a cocotb test bench, and the test vectors of a frame."""
 
 import os
 from collections.abc import Iterator, Mapping, Sequence
@@ -176,7 +176,7 @@ def write_testbench(
     text: str,
     about: Sequence[str],
 ) -> None:
-    """Write a bench, its vectors and the Verilog into a folder. Each file is whole or not there.
+    """Write a bench, its test vectors and the Verilog into a folder. Each file is whole or not there.
 
     Parameters
     ----------

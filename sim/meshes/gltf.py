@@ -27,7 +27,8 @@ __all__ = [
     "tell_contents",
 ]
 
-# Extensions: read; without effect on the parts that are read; left out of the picture, and listed.
+# Extensions in three groups: they are read; they have no effect on the parts that are read; they are left out
+# of the picture, and listed.
 _READ = {"KHR_draco_mesh_compression", "KHR_mesh_quantization", "EXT_mesh_gpu_instancing"}
 _UNLIT, _STRENGTH = "KHR_materials_unlit", "KHR_materials_emissive_strength"
 _READ |= {"KHR_node_visibility", "KHR_texture_transform", "EXT_texture_webp", GLOSSY, _UNLIT, _STRENGTH}
@@ -49,7 +50,7 @@ _TOLD |= {
         *("specular", "transmission", "volume", "volume_scatter"),
     )
 }
-# Known keys: of parts that are read or counted, and keys that say nothing of the look.
+# Known keys: keys of parts that are read or counted, and keys that do not change the look.
 _ANY = {"name", "extensions", "extras"}
 _KNOWN = {
     "document": {"asset", "scene", "scenes", "nodes", "meshes", "materials", "accessors", "bufferViews"}
@@ -247,7 +248,7 @@ def _are_numbers(given: Any, count: int) -> bool:
 
 
 def _cutoff(text: dict, alpha: float, key: str, name: str) -> float:
-    """Least alpha of a material that is drawn; `Refused` if it or the alpha of a factor is out of range."""
+    """Cutoff of a material's alpha; `Refused` if the cutoff, or the alpha of a factor, is out of range."""
     cutoff = text.get("alphaCutoff", 0.5)
     for what, value, most in (("alphaCutoff", cutoff, 1e30), (f"alpha of {key}", alpha, 1)):
         if not _are_numbers([value], 1) or not 0 <= value <= most:

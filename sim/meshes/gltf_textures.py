@@ -33,7 +33,7 @@ _MAG = {9728: "nearest", 9729: "bilinear"}
 # Filter inside a level, and whether levels are used. Levels are chosen, not blended.
 _MIN = {9728: ("nearest", False), 9729: ("bilinear", False)}
 _MIN |= {9984: ("nearest", True), 9985: ("bilinear", True), 9986: ("nearest", True), 9987: ("bilinear", True)}
-# Keys that are read, and keys that say nothing of the look.
+# Keys that are read, and keys that do not change the look.
 _KNOWN = {
     "texture infos": {"index", "texCoord"},
     _TRANSFORM: {"offset", "rotation", "scale", "texCoord"},

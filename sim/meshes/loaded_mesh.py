@@ -143,7 +143,10 @@ def assembled(
 
 
 def _colors(given: np.ndarray | None, faces: np.ndarray, found: Found) -> np.ndarray | None:
-    """Colours and alpha of a part's vertices, 0 to 1, shape (V, 4). Values over 1 are cut and recorded."""
+    """Colours and alpha of a part's vertices, 0 to 1, shape (V, 4).
+
+    Values over 1 become 1, and are recorded in ``found``.
+    """
     if given is None:
         return None
     used = np.unique(faces)

@@ -93,15 +93,21 @@ def load_mesh(
       KHR_texture_transform, and its image in the buffer, in the text or in a file of the folder;
     - colours of vertices, COLOR_0;
     - with ``alphaMode`` MASK the ``alphaCutoff`` (0.5 if missing), and alpha of the factor, of the texture
-      and of COLOR_0. Pixels under the cutoff are dropped before the depth test. Alpha of other modes is told.
+      and of COLOR_0. Pixels under the cutoff are dropped before the depth test. Alpha of other modes is not
+      read, and is listed in ``ignored``.
 
     A sampler's filter for enlarging also serves for reducing. Levels are chosen, not blended.
 
-    Of an OBJ file these are read from the ``mtllib`` files in its folder: ``Kd``, ``Ks`` and ``Ns`` (rounded,
-    at least 1), or ``Kd``, roughness ``Pr`` and metallic factor ``Pm``; ``Ke``, ``illum 0``. The factors of
-    glTF are linear, as k_d is. So they are used without conversion, and Kd, too. If a material file is
-    missing, or lacks a name, the colours are ``None``. Materials that no face uses are left out, and equal
-    materials are merged.
+    Of an OBJ file these are read from the ``mtllib`` files in its folder:
+
+    - the colour ``Kd``;
+    - ``Ks`` and ``Ns`` (rounded, at least 1), or in their place roughness ``Pr`` and metallic factor ``Pm``;
+    - ``Ke``, light that the surface emits;
+    - ``illum 0``, which makes the material unlit.
+
+    The factors of glTF are linear, as k_d is. So they are used without conversion. ``Kd`` is used without
+    conversion, too. If a material file is missing, or has no material of the name that is used, the colours
+    are ``None``. Materials that no face uses are left out, and equal materials are merged.
 
     *Colours of other formats* are decoded by the curve of sRGB:
 
@@ -116,10 +122,10 @@ def load_mesh(
     *Lights and camera* of a glTF file are read: KHR_lights_punctual, see `placed_lights`, and the first
     camera.
 
-    *Looks.* In a mesh with colours of vertices other vertices are white. Colours over 1 count as 1, and are
-    listed in ``ignored``. Corners of equal normal are welded only if their colours and texture coordinates
-    are equal, too. A part without texture coordinates is drawn without its texture, and so is a part whose
-    image is not there.
+    *Looks.* If only some vertices of a mesh have colours, the others are white. Colours over 1 count as 1,
+    and are listed in ``ignored``. Corners of equal normal are welded only if their colours and texture
+    coordinates are equal, too. A part without texture coordinates is drawn without its texture. So is a part
+    whose image is not there.
 
     Contents that belong to the picture and are not read are in ``ignored``: other textures, alpha, ``illum``,
     smoothing groups, animations. Each reader has a list of the statements, keywords, properties, keys and
@@ -158,8 +164,9 @@ def load_mesh(
         - it refers to buffers outside its folder;
         - it needs a decoder that is not installed, or a glTF extension that is not supported;
         - its numbers are not written as the format demands;
-        - it holds no triangle, a vertex that is not finite, an index out of range, nodes that form no trees,
-          or more than 20 million triangles;
+        - it holds no triangle, or more than 20 million triangles;
+        - a vertex is not finite, or an index is out of range;
+        - its nodes do not form trees;
         - a used material has a colour that is not three numbers from 0 to 1, or an exponent over 1000;
         - an image, colour, texture coordinate, sampler or transform that is used is damaged or out of range;
         - more than 1024 materials are in use.
@@ -212,8 +219,11 @@ def given_mesh(source: object, crease_angle: float = DEFAULT_CREASE) -> LoadedMe
     Raises
     ------
     InputError
-        If the source is no mesh, or has no faces or too many, an index out of range or a vertex that is not
-        finite.
+        In one of these cases:
+
+        - the source is no mesh;
+        - it has no faces, or too many faces;
+        - an index is out of range, or a vertex is not finite.
     """
     if any(base.__module__.partition(".")[0] == "trimesh" for base in type(source).__mro__):
         import trimesh

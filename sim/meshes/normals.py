@@ -115,7 +115,7 @@ def weighted_normals(
 def repaired_normals(
     vertices: np.ndarray, faces: np.ndarray, directions: np.ndarray, normals: np.ndarray, own: np.ndarray
 ) -> tuple[np.ndarray, int]:
-    """Unit stored normals of vertices ``own``, and the number of mended normals.
+    """Stored normals of the vertices ``own``, normalised, and the number of mended normals.
 
     ``directions`` are the unit normals of the faces.
     """

@@ -25,7 +25,7 @@ _TYPES = {
     **{f"{'u' * (kind[0] == 'u')}int{8 * int(kind[1])}": kind for kind in _KINDS.values()},
     **{"float": "f4", "double": "f8", "float32": "f4", "float64": "f8"},
 }
-# Properties that are read, and properties that change nothing, or only the look of textures.
+# Properties of three kinds: they are read; they change nothing; they change only the look of textures.
 _KNOWN = {
     "vertex": {"x", "y", "z", "nx", "ny", "nz", "s", "t", "u", "v", "texture_u", "texture_v"}
     | {"texture_s", "texture_t", "confidence", "intensity", "quality", "value", "flags", "radius"},
@@ -259,7 +259,7 @@ def _separated(strips: _List) -> np.ndarray:
 
 
 def _triangles(vertices: np.ndarray, face: _Columns) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Triangles of faces, their corners' places in the list of all corners, and their faces."""
+    """Triangles of faces, the places of their corners in the list of all corners, and the face of each."""
     indices = _indices(face)
     if indices is None:
         return np.zeros((0, 3), dtype=np.int64), np.zeros((0, 3), dtype=np.int64), np.zeros(0, dtype=np.int64)

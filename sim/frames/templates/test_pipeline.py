@@ -1,4 +1,4 @@
-"""Test of the shading pipeline beside this file against expected pixels; README.md describes the vectors."""
+"""Test of the shading pipeline beside this file against expected pixels; README.md describes the files."""
 
 import csv
 import random
@@ -17,7 +17,7 @@ SETTLE = 64
 
 
 def read(name):
-    """Rows of a file of vectors, each a mapping of ports to codes."""
+    """Rows of a file of test vectors, each a mapping of ports to codes."""
     with open(VECTORS / f"{name}.csv", newline="") as file:
         return [{port: int(code) for port, code in row.items()} for row in csv.DictReader(file)]
 
