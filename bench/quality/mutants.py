@@ -1,4 +1,4 @@
-"""Mutation score of every unit: the share of small faults in its hardware that the record's vectors find.
+"""Mutation score of every unit: the share of small faults in its hardware that the record's stimuli find.
 
 ``python -m blysk.bench.quality.mutants [UNIT ...]`` takes faults of a unit at random (Yosys' pass
 ``mutate``). A fault sets a bit of a cell to 0 or 1, or inverts it. Some faults invert the bit only while
@@ -58,7 +58,7 @@ LEAST = 0.95
 @click.option("--jobs", type=Whole(1, 64), default=processors, help="Processes.  [default: number of cores]")
 @click.option("--json", "figures", type=click.Path(), help="JSON file with every figure.")
 def _command(units, count, seed, jobs, figures) -> int:
-    """Inject small faults into every unit or the named units, and print how many its vectors find."""
+    """Inject small faults into every unit or the named units, and print how many faults the stimuli find."""
     unknown = [unit for unit in units if unit not in UNITS]
     if unknown:
         raise InputError(unknown[0], "is not a unit", f"choose from {', '.join(UNITS)}")

@@ -1,4 +1,4 @@
-"""Mutants of a unit: small faults in its netlist, all in one compiled model, and the vectors to test them."""
+"""Mutants of a unit: small faults in its netlist, all in one compiled model, and the stimuli to find them."""
 
 import ctypes
 import json
@@ -245,8 +245,8 @@ def mutate(unit: Component, count: int, seed: int, folder: Path) -> dict[int, st
     for number, text in enumerate(listed, 1):
         mutant = _described(text, top["cells"], behind)
         # Four kinds of faults are left out. A fault of a clock is not small. The contents of a memory must be
-        # constant. A port of a memory may not have the control with the fault. A bit might depend on itself
-        # if an output bit of a cell inverts another output bit.
+        # constant. A read port of a memory may lack the reset or the enable that has the fault. If an output
+        # bit of a cell inverts another output bit, a bit might depend on itself.
         small = not re.search(r"^\w+ (\$meminit|\S+ [A-Z_]*CLK\[)|^cnot\d \S+ Y\[", mutant)
         if small and not _of_missing_control(text, top["cells"]):
             kept.append(text.replace("mutate", f"mutate -ctrl mutant {width} {number}", 1))
@@ -387,7 +387,7 @@ class Mutants(cxxrtl.Compiled):
 
 
 def killed(model: Mutants, vectors: Sequence[tuple[Drive, Trace]], mutants: Iterable[int]) -> set[int]:
-    """Numbers of the mutants whose trace differs from the unit's trace for a vector.
+    """Numbers of the mutants whose trace differs from the unit's trace for one of the stimuli.
 
     A counter of events has more bits than a run has events. Therefore, for each word of the status, the
     shortest run that changes the word is made again. The counters begin at a power of 2 less 1, for each

@@ -64,7 +64,7 @@ class Score:
 
     @property
     def killed(self) -> int:
-        """Number of mutants that the vectors kill."""
+        """Number of mutants that the stimuli kill."""
         return self.mutants - len(self.equivalent) - len(self.survived)
 
     @property
@@ -87,7 +87,7 @@ class Score:
 
 
 def measure(unit: str, count: int, seed: int) -> dict[str, Any]:
-    """Make mutants of a unit, run its record's vectors on them, and try to prove the survivors equivalent.
+    """Make mutants of a unit, run its record's stimuli on them, and try to prove the survivors equivalent.
 
     Parameters
     ----------

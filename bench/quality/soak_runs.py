@@ -229,7 +229,7 @@ def measure(
 
 
 def measure_unit(unit: str, beats: int, seed: int, part: int, baseline: str | None) -> dict[str, int]:
-    """Send every stimulus of a unit's record, drawn anew, and compare outputs with the bit-accurate model.
+    """Send every stimulus of a unit's record, with new random numbers, and compare outputs with the model.
 
     The stimuli take about equal numbers of cycles. So there are many small triangles and few large triangles.
 

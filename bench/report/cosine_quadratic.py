@@ -168,7 +168,7 @@ PUBLISHED = (
 
 
 def claims(quick: bool) -> list[Claim]:
-    """`PUBLISHED`, and the same measures of related models and of a refitted line. All are there if quick."""
+    """`PUBLISHED`, and the same measures of related models and of a refitted line. Quick reports have all."""
     related = [_of_model(model, key) for model in _RELATED for key in ("absolute", "relative")]
     refitted = Claim(
         "ours", "", _LINE.replace("0.448 n + 0.099", "0.44813 n + 0.10235"), slopes, key="refitted"

@@ -153,7 +153,7 @@ def shortcut(degrees: float) -> Pair:
 
 
 def recurrence(pixels: int, degrees: float, bits: int) -> Pair:
-    """Worst error of a recurrence over a span, with its peak at 0.79: as drawn, and in Reinsch's form."""
+    """Worst error over a span with the peak at t = 0.79: recurrence of [T] figure 3.5, and Reinsch's form."""
     angle = math.radians(degrees)
     step = angle / (pixels - 1)
     exact = np.cos(0.79 * angle - step * np.arange(pixels))

@@ -93,8 +93,8 @@ def conclusion(cases: Mapping[str, Any], ranges: Mapping[str, Any]) -> Conclusio
     if "quotient" in ranges:
         end = min(ranges["quotient"]["widest"][str(exponent)] for exponent in RANGE_EXPONENTS)
         sentence += (
-            f" `quotient` serves spans of up to {end:.3g} degrees at every exponent, if the lengths at their "
-            "ends differ by at most 2:1. Other spans are halved before the pipeline."
+            f" `quotient` serves spans of up to {end:.3g} degrees at every exponent, if the lengths of the "
+            "vectors at their ends have a ratio of at most 2. Other spans are halved before the pipeline."
         )
     return Conclusion("In which range is a method exact?", sentence, _drawing(cases, ranges, worst, lit))
 

@@ -214,7 +214,7 @@ def _angles(raster: Raster) -> np.ndarray:
 
 
 def _line_angles(spans: Spans) -> np.ndarray:
-    """For each line, the angle in degrees of a chord of the unit sphere at the same distance from 0."""
+    """Angle in degrees of each line: the angle of a chord of the unit sphere at the same distance from 0."""
     left, right = (
         codes / Renormaliser.VECTOR_FORMAT.max_code for codes in (spans.normal_left, spans.normal_right)
     )
@@ -226,7 +226,10 @@ def _line_angles(spans: Spans) -> np.ndarray:
 
 
 def _has_unit_length(design: ShadingPipeline, codes: Sequence[np.ndarray]) -> np.ndarray:
-    """Whether both ends of spans, or the longer end of a line, have length 1 within `LENGTH_TOLERANCE`."""
+    """Whether both normals at the ends of a span have length 1 within `LENGTH_TOLERANCE`.
+
+    Of a line only the longer normal has to have this length.
+    """
     lengths = np.linalg.norm(np.stack(codes) / ONE, axis=2)
     if design.interpolator.curve_is_exact:
         lengths = lengths.max(axis=0, keepdims=True)

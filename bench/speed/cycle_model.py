@@ -56,7 +56,7 @@ def span_cycles(length: np.ndarray, interval: np.ndarray, waiting: int = WAITING
 def _matrices(length: np.ndarray, interval: np.ndarray, waiting: int) -> np.ndarray:
     """Max-plus matrices, shape (spans, 4, 4). Matrix k leads from the state of span k - 1 to that of span k.
 
-    The state of span k is the end of its pixels, r_k, s_k and s_{k-1}.
+    The state of span k has four numbers: the cycle after its last pixel, r_k, s_k, and s_{k-1}.
     """
     found = np.full((len(length), 4, 4), _NEVER, dtype=np.int64)
     found[:, :3, 1] = np.asarray(interval)[:, np.newaxis]

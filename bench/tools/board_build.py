@@ -26,7 +26,10 @@ __all__ = [
 ]
 
 PERIODS = 1
-"""Periods of the reader's clock that a path between two clocks may take. The words on it stay longer."""
+"""Periods of the reader's clock that a path between two clocks may take.
+
+The words on the path stay unchanged for longer than this.
+"""
 
 _LIBRARY = """\
 read_verilog -lib -specify +/lattice/cells_sim_ecp5.v

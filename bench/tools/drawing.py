@@ -33,7 +33,7 @@ A name replaces a longer formula.
 _TAGS = 70.0
 """Approximate width that tags take on a side of a band."""
 _BAND = 6
-"""A further band costs as much as this number of cut arrows."""
+"""A further band costs as much as this number of arrows from band to band."""
 _FACES = {
     "input": "#ffffff",
     "output": "#ffffff",
@@ -270,7 +270,7 @@ class _Layout:
 
 
 def _cuts(graph: Graph, columns: dict[int, int]) -> list[int]:
-    """First columns of the bands. Each band is narrow enough, and few arrows are cut."""
+    """First columns of the bands. Each band is narrow enough, and few arrows lead from band to band."""
     last = max(columns.values()) + 1
     widths = np.zeros(last)
     for number, column in columns.items():

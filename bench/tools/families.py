@@ -193,7 +193,8 @@ class Place:
     closed : int
         Multipliers with registers inside on both sides. nextpnr does not time paths between these registers.
     rerouted : bool
-        Whether the target was out of reach, so that slow paths were not routed again.
+        Whether the target was out of reach. The design was then routed a second time. In this second routing
+        nextpnr does not remove slow paths to route them again.
     """
 
     seed: int

@@ -15,8 +15,8 @@ between registers on both sides. A design with this path is quoted with at most 
 below the table.
 
 On Nexus Yosys moves registers beside a multiplier into the multiplier. nextpnr times each stage of a
-multiplier, with clock-to-output and setup times of its registers. Only a multiplier with an adder inside has
-no delay. A design with it is refused.
+multiplier, with clock-to-output and setup times of its registers. Only for a multiplier with an adder inside
+does nextpnr know no delay. A design with this multiplier is refused.
 """
 
 from collections.abc import Callable, Container, Iterator, Mapping, Sequence
@@ -63,7 +63,7 @@ _HEAD = ("design", "LUT", "FF", "mult", "BRAM", "LUTRAM", "min", "median", "max"
 
 
 def table(layouts: Sequence[Layout], family: Family = ECP5) -> str:
-    """The figures as aligned text, below the parts of the device. The path is from the slowest seed."""
+    """Figures as aligned text. The first row has the device's own parts. A path is of the slowest seed."""
     lines = [_HEAD, (family.device, *map(str, asdict(family.capacity).values()), "", "", "", "")]
     for layout in layouts:
         slowest = min(layout.places, key=lambda place: place.fmax)
@@ -79,7 +79,7 @@ def table(layouts: Sequence[Layout], family: Family = ECP5) -> str:
 
 
 def table_by_unit(name: str, units: Mapping[str, Parts], family: Family = ECP5) -> str:
-    """Parts of each unit as aligned text, between the parts of the device and of the whole design."""
+    """Parts of each unit as aligned text. The first row has the device's parts, the last row the design's."""
     rows = {family.device: family.capacity, **units, name: sum_parts(units)}
     head = ("unit", *_HEAD[1:6])
     return _aligned([head, *((unit, *map(str, asdict(parts).values())) for unit, parts in rows.items())], {0})
@@ -109,12 +109,12 @@ def untimed(layouts: Sequence[Layout], family: Family = ECP5) -> Iterator[str]:
 
 
 def rerouted(layouts: Sequence[Layout]) -> Iterator[str]:
-    """A line for each design that is so far from the target that nextpnr did not route slow paths again."""
+    """A line for each design that is so far from the target that slow paths could not be mended."""
     for layout in layouts:
         if seeds := [str(place.seed) for place in layout.places if place.rerouted]:
             yield (
-                f"{layout.name}: from seed {', '.join(seeds)} the target was out of reach. Slow paths were "
-                "not routed again."
+                f"{layout.name}: with seed {', '.join(seeds)} the target was out of reach. The design was "
+                "routed a second time, without another routing of slow paths."
             )
 
 
@@ -158,7 +158,7 @@ def pipelines_of(
 ) -> Iterator[tuple[str, Callable[[], wiring.Component]]]:
     """The core by arguments of `design` and options of its build, with the given method.
 
-    With ``every`` there is a core for every method that serves this core. The default transfer is linear.
+    With ``every``: the same kind of core, once for each method that serves it. Transfer is linear by default.
 
     Raises
     ------

@@ -213,7 +213,7 @@ def any_spans(rng: np.random.Generator, design: ShadingPipeline, length: np.ndar
 
 
 def vectors_for(rng: np.random.Generator, design: ShadingPipeline, length: np.ndarray) -> SpanVectors:
-    """Any vectors of spans of given lengths, for a method that takes vectors."""
+    """Any vectors that spans with given numbers of pixels bring, for a method that takes vectors."""
     highlights = design.specular is not None
     return any_span_vectors(rng, design.interpolator, design.lights, highlights, length)
 

@@ -81,7 +81,7 @@ def _case(left, right, vector, length):
 
 
 def _spans(unit, rng, count):
-    """Pairs of normals at any angle, with any vector and length. Every sixteenth pair has any codes."""
+    """Pairs of normals at any angle, any vector, and spans of any length. Every 16th pair has any codes."""
     return _case(*any_pairs(rng, count), unit_codes(rng, count), any_lengths(rng, count))
 
 
@@ -156,7 +156,9 @@ RECORD = Record(
         ),
         "the correction is at most 0.4143": "corrections_sum[21] corrections_rounded[17-18]",
         "from 0 to 90 degrees the factor is 0.636 to 0.708": "total[14-18] factor[14-16]",
-        "earlier sums of the factor's polynomial are smaller": "total_3[15-16] total_2[16]",
+        "in the factor's polynomial the sum total_3 is less than 1/16, and total_2 less than 1/8": (
+            "total_3[15-16] total_2[16]"
+        ),
         "a root is at most 1, and reaches 1 only by rounding": "root_sum[21] root_rounded[18]",
         "x is less than 2 before the steps of CORDIC, and less than 4 after them": (
             "cordic_x[27-29] cordic_x_*[28-29]"
@@ -164,7 +166,7 @@ RECORD = Record(
         "the distance and its parts are 0 to 4, and parts shifted by 16 bits are less than 2^-14": (
             "gain_1_sum*[32-33] gain_16_sum[16-33] cos_beta_rounded[27-29]"
         ),
-        "the terms of the sum end in zeros": "gain_1_sum[0]",
+        "the terms of the sum gain_1_sum end in zeros": "gain_1_sum[0]",
         "the last bits of a direction are the same for all signs of CORDIC's steps": (
             "direction[0-26] direction_0[0-25] direction_{1,2}[1] direction_*[0]"
         ),

@@ -35,7 +35,7 @@ def _cosines(unit, rng, count):
 
 
 def _corners(unit, rng, count):
-    """Operands next to the bounds of each segment, to 0, 1 and -1, extreme codes, and any in range."""
+    """Operands next to bounds of segments and next to 0, 1 and -1; extreme codes; any operands in range."""
     one, bounds = unit.model.MAGNITUDE_FORMAT.code(1), unit.model.bounds
     ends = np.r_[0, 1, bounds - 1, bounds, bounds + 1, one - 1, one, one + 1, FORMAT.max_code]
     return Case(np.r_[ends, -ends, FORMAT.min_code, rng.integers(-one, one + 1, count)])

@@ -41,7 +41,7 @@ __all__ = [
     "values_of",
 ]
 
-LOCAL = "lights and viewer at distances 2 to 4, spans to length 0.3 and 15 degrees"
+LOCAL = "lights and viewer at distances 2 to 4, spans up to 0.3 wide in space and to 15 degrees"
 FORMATS = {"diffuse": ChordSetup.DIFFUSE_FORMAT, "highlight": ChordSetup.HIGHLIGHT_FORMAT}
 
 
@@ -170,7 +170,7 @@ def _lengths(unit, rng, count):
 
 
 def _spans(unit, rng, count):
-    """Curves of every size, and lengths with a uniform logarithm. Every eighth span has random codes."""
+    """Curves of every size. The logarithm of span lengths is uniform. Every eighth span has random codes."""
     return Case(value_beats(unit, any_values(rng, count, unit.lights), _lengths(unit, rng, count)))
 
 

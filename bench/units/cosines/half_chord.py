@@ -108,7 +108,9 @@ RECORD = Record(
     still={
         "operands are not negative, and less than 1": ("multiplier_0_?[17] multiplier_0_product*[34-35]"),
         "from 0 to 90 degrees the factor is 0.636 to 0.708": "total[14-18] factor[14-16]",
-        "earlier sums of the factor's polynomial are smaller": "total_3[15-16] total_2[16]",
+        "in the factor's polynomial the sum total_3 is less than 1/16, and total_2 less than 1/8": (
+            "total_3[15-16] total_2[16]"
+        ),
         "a root is at most 1, and reaches 1 only by rounding": "root_sum[21] root_rounded[18]",
     },
 )

@@ -91,7 +91,7 @@ def _corners(unit, rng, count):
 
 
 def _last_bits(unit, rng, count):
-    """Lengths that set every bit, and many short spans, as last bits of products rarely change a result."""
+    """Spans whose lengths set every bit, and many short spans, as last bits rarely change a result."""
     powers = 1 << np.arange(12)
     return spans_of(rng, np.r_[powers, powers + 1, rng.integers(1, 4, count // 2)])
 

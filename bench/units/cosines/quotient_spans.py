@@ -18,7 +18,7 @@ __all__ = ["RECORD", "any_vectors", "line_directions", "pixel_word_beats"]
 def any_vectors(
     rng: np.random.Generator, model: QuotientSpans, length: np.ndarray, near: bool = False
 ) -> SpanVectors:
-    """Vectors of spans of given lengths.
+    """Vectors that spans bring, for spans with given numbers of pixels.
 
     As from a source, the vectors at both ends of a span have a ratio of lengths up to 2 and an angle up to 90
     degrees.
@@ -83,7 +83,7 @@ def _case(unit, vectors, length, constants):
 
 
 def _spans(unit, rng, count):
-    """Spans of every length, most of them short. The ends have ratios up to 2 and angles up to 90 degrees."""
+    """Spans, most of them short. Vectors at the ends have length ratios to 2 and angles to 90 degrees."""
     length = np.maximum(short_lengths(rng, count, 1) % (1 << unit.length_bits), 1)
     vectors = any_vectors(rng, unit.model, length)
     return _case(unit, vectors, length, line_directions(rng, unit.model.lights))
@@ -122,13 +122,13 @@ _DEFAULT = QuotientSpans()
 
 RECORD = Record(
     name="quotient_spans",
-    title="Squared lengths and lines of N/W along spans, by forward differences",
+    title="Squares and linear functions of N/W along spans, by forward differences",
     source="docs/theory/quotient.md#span",
     variants={
         "N.H": Variant(
             partial(QuotientSpansUnit, _DEFAULT),
             partial(_measure, model=_DEFAULT),
-            "ends to 1:2 and 90 degrees, 1 to 4095 pixels",
+            "vectors at the ends to 1:2 and 90 degrees, 1 to 4095 pixels",
             beat={"length": 64},
             note="relative error of q, for the codes of the vectors",
         ),

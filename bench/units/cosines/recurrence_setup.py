@@ -72,7 +72,7 @@ def _vectors(unit, rng):
 
 
 def _spans(unit, rng, count):
-    """Normals at any angle, and lengths with a uniform logarithm. Every 16th pair has random codes."""
+    """Normals at any angle. The logarithm of span lengths is uniform. Every 16th pair has random codes."""
     left, right = any_pairs(rng, count)
     beats = {"normal_left": left, "normal_right": right, "length": any_lengths(rng, count)}
     return Case(beats, light_constants(unit, *_vectors(unit, rng)))

@@ -85,7 +85,7 @@ def _again(unit, rng, count):
 
 
 def _nearer(unit, rng, count):
-    """Each span is in front of the spans before it. Its first depth is at most 8/512 from a depth's code."""
+    """Each span is in front of the spans before it. Its first depth is within 8/512 of a step of a code."""
     case = _case(rng, count, unit.size, min(8, unit.size[0]), 0)
     last = case.beats["pixel"]["last"]
     span = np.cumsum(last) - last

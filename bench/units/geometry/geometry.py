@@ -69,7 +69,7 @@ def _drawn(unit, rng, count):
 
 
 def _dense(unit, rng, count):
-    """Triangles of one pixel. All are drawn, so the setup alone decides the rate."""
+    """Triangles of one pixel. None is dropped, so the setup alone decides the rate."""
     frame = FrameSettings(-60, -60, 60, 60, "flip", 200)
     triangles = random_triangles(rng, count, unit.grid, 1.0, 0.1)
     # Each triangle is half of a square with sides of 5/4 pixels. It has the square's only pixel centre.

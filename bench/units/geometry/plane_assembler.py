@@ -62,12 +62,12 @@ def _usual(unit, rng, count):
 
 
 def _largest(unit, rng, count):
-    """As above, with the largest limit."""
+    """Sizes and bounds of the same kinds, with the largest limit."""
     return _case(rng, count, 1023)
 
 
 def _least(unit, rng, count):
-    """As above, with a limit of 0 or 1. A limit of 0 cuts all spans to single pixels."""
+    """Sizes and bounds of the same kinds, with limit 0 or 1. Limit 0 cuts all spans to single pixels."""
     return _case(rng, count, int(rng.integers(0, 2)))
 
 

@@ -111,7 +111,7 @@ RECORD = Record(
     },
     axis="log2 of the vector's length",
     still={
-        "u counts half steps, and is odd": "u[0]",
+        "u counts half steps; half a step stands for its dropped bits, so u is odd": "u[0]",
         "pair_2 is a multiple of 16, and pair_4 of 256": "pair_2[0-3] pair_4[0-7]",
     },
 )

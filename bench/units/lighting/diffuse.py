@@ -37,7 +37,7 @@ def _words(unit, rng, count):
 
 
 def _corners(unit, rng, count):
-    """Cosines of 0 and 1, ties of rounding, saturated words, and the codes next to them; extreme codes."""
+    """Cosines of 0 and 1, ties of rounding, and saturated words; codes next to all these; extreme codes."""
     format, step = unit.model.operand_format, 1 << 17
     centres = np.array([0, ONE_SQUARED.codes.item(), 1 << 34, (1 << 34) - step, step // 2, 3 * step // 2])
     codes = np.r_[(centres[:, np.newaxis] + [-1, 0, 1]).ravel(), format.min_code, format.max_code]

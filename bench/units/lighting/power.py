@@ -24,7 +24,7 @@ def _last_bits(unit, rng, count):
 
 
 def _ties(unit, rng, count):
-    """Operands, chosen from many, whose complement is within 4 of its steps from a step of the result."""
+    """Operands, chosen from many. Their complement is within 4 of its own steps of a code of the result."""
     p = unit.model
     case = highlights(unit, rng, count, int(rng.integers(1, 1001)))
     operand = Fixed(p.operand_format, case.beats["operand"])

@@ -31,7 +31,7 @@ _STILL = {
     "a second difference is twice a number, so its last bit is 0": (
         "{diffuse,highlight}_0_second_difference[0]"
     ),
-    "a span enters only if the counts are less than 28 spans and 12 long spans; 3 more are not counted yet": (
+    "a span enters if the counts are under 28 spans and under 12 long spans; at most 3 are not counted yet": (
         "spans_inside[5] lengths.inner_level[5] long_inside[4] behind[4]"
     ),
 }

@@ -49,7 +49,7 @@ RECORD = Record(
         "middle_2": "The bit is 1 only in a word of 2 or more. A middle normal has length 1.",
     },
     still={
-        "at most 8 spans are in the middle normal and 2 in GPQ; 3 of these are not in the inner FIFO": (
+        "at most 8 spans are in the middle normal and 2 in GPQ; 3 of the 10 are not in the inner FIFO": (
             "lengths.inner_level[3]"
         ),
     },

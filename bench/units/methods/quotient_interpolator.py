@@ -20,7 +20,10 @@ _METHOD = QuotientInterpolator()
 def any_span_vectors(
     rng: np.random.Generator, method: QuotientInterpolator, lights: int, highlights: bool, length: np.ndarray
 ) -> SpanVectors:
-    """Vectors of spans of given lengths. A twentieth are too short, so these spans are out of range."""
+    """Vectors that spans bring, for spans with given numbers of pixels.
+
+    A twentieth of the vectors are too short. Their spans are out of range.
+    """
     vectors = any_vectors(rng, method.spans(lights, highlights), length)
     lost = rng.random(len(length)) < 0.05
     vectors.start[lost] >>= 12

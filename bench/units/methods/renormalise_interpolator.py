@@ -33,7 +33,7 @@ _LARGEST = 120.0
 
 
 def _measure(rng, count):
-    """N·L and 1 - N·H along spans whose ends have lengths of 1/4 to 1.
+    """N·L and 1 - N·H along spans. The vectors at their ends have lengths of 1/4 to 1.
 
     The dot product of two equal unit vectors counts as 1.
     """
@@ -74,7 +74,7 @@ def _status(unit, case):
 def _case(unit, rng, length):
     length = np.maximum(length % (1 << unit.length_bits), 1)
     left, right = any_lines(rng, len(length))
-    # The ends are nearly opposite and have nearly equal lengths. So the line passes near 0.
+    # The vectors at the ends are nearly opposite and nearly equally long. So the line passes near 0.
     left[1::16] = -right[1::16] + rng.integers(-20_000, 20_000, right[1::16].shape)
     limit = _METHOD.END_FORMAT.max_code
     beats = {"normal_left": np.clip(left, -limit, limit), "normal_right": right, "length": length}
@@ -82,7 +82,7 @@ def _case(unit, rng, length):
 
 
 def _spans(unit, rng, count):
-    """Ends with any ratio of lengths and any angle. Some are nearly opposite. Most spans are short."""
+    """Vectors of any lengths and angle at the ends, some nearly opposite. Most spans are short."""
     return _case(unit, rng, short_lengths(rng, count, 1))
 
 
@@ -104,7 +104,7 @@ RECORD = Record(
         "renormalise": Variant(
             partial(RenormaliseInterpolatorUnit, _METHOD, 1),
             _measure,
-            f"spans to {_LARGEST:g} degrees, ends of lengths 1/4 to 1, 1 to 4095 pixels",
+            f"spans to {_LARGEST:g} degrees, vectors of length 1/4 to 1, 1 to 4095 pixels",
             beat={"length": 64},
             note="errors of N.L and 1 - N.H; the true line counts as exact",
         ),

@@ -84,7 +84,7 @@ def _spans(unit, rng, count):
 def _corners(unit, rng, count):
     """Spans of every number of levels, with angles of 0, 45, 90 and 180 degrees among them.
 
-    Some lengths are 0, 4095 or next to a power of two.
+    Some spans have 0 or 4095 pixels, or a number of pixels next to a power of two.
     """
     length = np.r_[1, 2, 3, 16, 0, 1, 1, 2, 2, 5, 17, 33, 64, 65, 100, 0, 0, 129, rng.integers(0, 80, count)]
     angles = rng.uniform(0, 95, len(length))

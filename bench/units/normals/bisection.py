@@ -71,7 +71,7 @@ def _pairs(unit, rng, count):
 
 
 def _corners(unit, rng, count):
-    """Angles of 0, 45, 90 and 180 degrees, small and any angles, extreme codes, u at a tie, the least u."""
+    """Pairs at 0, 45, 90, 180, small and any angles; pairs of extreme codes; a tie of u; the least u."""
     angles = np.r_[np.zeros(20), np.full(20, 45), np.full(20, 90), 10.0 ** rng.uniform(-4, 0, 100)]
     angles = np.r_[angles, rng.uniform(0, 90, count), rng.uniform(90, 180, 60), 180]
     a, b = (np.vstack([end, word_ends(rng, 100, 3)]) for end in code_pairs_at(rng, len(angles), angles))

@@ -93,7 +93,7 @@ def _spans(unit, rng, count):
 
 
 def _corners(unit, rng, count):
-    """Angles 0, 45, 90, 180, small angles, angles up to 100 degrees, and extreme codes, at any level."""
+    """Pairs at 0, 45, 90, 180, small and up to 100 degrees; pairs of extreme codes. The level is any."""
     angles = np.r_[0, 45, 90, 180, 10.0 ** rng.uniform(-4, 0, count // 4), rng.uniform(0, 100, count)]
     ends = (
         np.vstack([end, word_ends(rng, count // 4, 3)]) for end in code_pairs_at(rng, len(angles), angles)

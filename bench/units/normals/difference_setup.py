@@ -42,7 +42,7 @@ def _case(unit, rng, length):
 
 
 def _spans(unit, rng, count):
-    """Coefficients of any size, and lengths with a uniform logarithm."""
+    """Coefficients of any size. The logarithm of span lengths is uniform."""
     length = any_lengths(rng, count) % (1 << unit.length_bits)
     return _case(unit, rng, np.maximum(length, 1))
 

@@ -50,7 +50,7 @@ def _lengths(unit, rng, count):
 
 
 def _lines(unit, rng, count):
-    """Lines of any angle with lengths of 1/100 to 1, or of any codes. The logarithm of pixels is uniform."""
+    """Lines between vectors of length 1/100 to 1 at any angle, or between any codes. Spans of any length."""
     left, right = any_lines(rng, count)
     return Case({"normal_left": left, "normal_right": right, "length": _lengths(unit, rng, count)})
 
@@ -75,7 +75,7 @@ RECORD = Record(
     title="Step from pixel to pixel of a straight line between two vectors",
     source="docs/theory/interpolation.md#renormaliser",
     variants={
-        "interval 4": Variant(LineSetupUnit, _measure, f"lengths of 0.1 to 1 at any angle, {LONG}"),
+        "interval 4": Variant(LineSetupUnit, _measure, f"vectors of length 0.1 to 1 at any angle, {LONG}"),
         **{
             f"interval {interval}": Variant(partial(LineSetupUnit, initiation_interval=interval), long=True)
             for interval in (1, 2, 3, 5, 9)

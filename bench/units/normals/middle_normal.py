@@ -53,7 +53,7 @@ def _spans(unit, rng, count):
 
 
 def _corners(unit, rng, count):
-    """Equal and opposite normals, angles up to 45 degrees, of 45 degrees and of more, and extreme codes."""
+    """Equal and opposite normals; angles below 45 degrees, of 45 degrees, and above; extreme codes."""
     angles = np.r_[np.zeros(20), rng.uniform(0, 45, count), np.full(20, 45), rng.uniform(45, 180, 60), 180]
     ends = (np.vstack([end, word_ends(rng, 100, 3)]) for end in code_pairs_at(rng, len(angles), angles))
     return _case(*ends)

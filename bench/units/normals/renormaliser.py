@@ -47,7 +47,7 @@ def _lengths(unit, rng, count):
 
 
 def _corners(unit, rng, count):
-    """Extreme codes, 0, 1 and -1, largest components next to every power of two, and vectors along axes."""
+    """Extreme codes, 0, 1 and -1 as components; largest components next to powers of two; vectors on axes."""
     words = [_FORMAT.min_code, -1, 0, 1, _FORMAT.max_code]
     ends = np.array(np.meshgrid(*[words] * 3)).reshape(3, -1).T
     powers = (1 << np.arange(_FORMAT.fraction_bits))[:, np.newaxis] + np.arange(-1, 2)

@@ -92,7 +92,7 @@ def test_designs_far_from_the_target_are_named():
     places = [Place(seed, 90.0, "a", "b", 1.0, 1.0, {}, 0, seed > 1) for seed in (1, 2, 3)]
     layouts = [Layout(f"{count} seeds", Parts(1, 2, 4, 0, 0), tuple(places[:count])) for count in (1, 3)]
     (line,) = rerouted(layouts)
-    assert line.startswith("3 seeds: from seed 2, 3 the target was out of reach")
+    assert line.startswith("3 seeds: with seed 2, 3 the target was out of reach")
 
 
 @pytest.mark.parametrize("options", [[], ["--keep-registers"]])
