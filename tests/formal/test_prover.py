@@ -1,4 +1,4 @@
-"""What was decided before is known by its digest; whatever differs is decided."""
+"""Statements that were decided before are recognised by their digest; all others are decided."""
 
 import pytest
 from amaranth.hdl import Mux, Signal, unsigned
@@ -10,7 +10,7 @@ pytestmark = [pytest.mark.prove, pytest.mark.skipif(bool(missing_tool()), reason
 
 
 def of_counter(last):
-    """A counter from 0 to 5, which is claimed not to pass a number."""
+    """A counter from 0 to 5, with the claim that it does not pass a number."""
     harness = Harness()
     count = Signal(unsigned(3))
     harness.m.d.sync += count.eq(Mux(count == 5, 0, count + 1))
@@ -26,7 +26,7 @@ def test_what_was_decided_is_known_and_nothing_else(tmp_path):
         (folder := tmp_path / str(k)).mkdir()
         verdict = expect(True, harness, folder, cycles, decided=Decided(first.used))
         assert verdict.holds is (k != 1)
-        # Only what is not known is decided.
+        # Only statements that are not known are decided.
         assert any(folder.iterdir()) == (k != 0)
 
 

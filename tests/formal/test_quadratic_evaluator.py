@@ -1,4 +1,4 @@
-"""Proofs of the quadratic evaluator: a span's pixels, all and in order, each at its t."""
+"""Proofs of the quadratic evaluator: all pixels of a span leave in order, each with its t."""
 
 import pytest
 from amaranth.hdl import Cat, Value
@@ -14,30 +14,30 @@ from .stubs import short
 
 pytestmark = [pytest.mark.prove, pytest.mark.seldom]
 
-# Of each form, with the stubs: pixels inside at most, and cycles for which a span waits at most.
+# For each form, with the stubs: the most pixels inside, and the most cycles for which a span waits.
 FORMS = {"direct": (12, 4), "horner": (11, 7)}
 
 
 def steps(span, gives):
-    """A step of t is one of a component."""
+    """A step of t is one step of a component."""
     step = QuadraticEvaluator.STEP_FORMAT
     yield Value.cast(gives.step).eq(1 << (step.fraction_bits - COMPONENT.fraction_bits))
     yield from (gives[name].eq(span[name]) for name in ("g", "p", "q", "length"))
 
 
 def tag(coefficients):
-    """A bit of each."""
+    """One bit of each coefficient."""
     return Cat(Value.cast(coefficients[name][0])[0] for name in "gpq")
 
 
 def polynomials(pixel, normal):
-    """Two bits of t beside the tag."""
+    """Two bits of t, and the tag."""
     yield Value.cast(normal[0]).eq(Cat(Value.cast(pixel.minus_t)[:2], tag(pixel)))
 
 
 @pytest.fixture(autouse=True)
 def stubs(monkeypatch):
-    """Units for the step, in a clock, and for the polynomial, in two, hand on tags."""
+    """Stubs that pass on tags: for the step, in one cycle, and for the polynomial, in two cycles."""
     for name, hand_on, latency, interval in (
         ("_StepUnit", steps, 1, 1),
         ("_DirectUnit", polynomials, 2, 1),
@@ -50,7 +50,7 @@ def stubs(monkeypatch):
 
 
 def of_pixels(form):
-    """Spans of 0 to 3 pixels."""
+    """Claims on spans of 0 to 3 pixels."""
     unit = QuadraticEvaluatorUnit(QuadraticEvaluator(form))
     h = Harness(unit)
     span, (capacity, waits) = unit.i.payload, FORMS[form]
@@ -68,9 +68,11 @@ def of_pixels(form):
 
 @pytest.mark.parametrize("form", FORMS)
 def test_pixels(prove, form):
-    """Inductive, lengths 0 to 3: what waits stays; a span's pixels leave in order, each once, each with its t
-    and its span's coefficients; while the output is ready, one leaves in 4 cycles, the stubs' latency and
-    one, and a span is taken in as many as `FORMS` says, and one."""
+    """By induction, for lengths 0 to 3: pixels leave in order and once each, with their t and coefficients.
+
+    A pixel that waits does not change. While the output is ready, a pixel leaves within 5 cycles (the latency
+    of the stubs is 4). A span is taken within one cycle more than `FORMS` states.
+    """
     prove(of_pixels(form))
 
 
@@ -89,6 +91,6 @@ BUGS = {
 
 @pytest.mark.parametrize("bug", BUGS)
 def test_bugs_are_found(refute, inject, bug):
-    """Injected in `QuadraticEvaluatorUnit`, each refutes the claims."""
+    """Each bug, injected in `QuadraticEvaluatorUnit`, refutes a claim."""
     inject(QuadraticEvaluatorUnit, "elaborate", *BUGS[bug])
     refute(of_pixels("direct"), 20)

@@ -1,8 +1,8 @@
 # amaranth: UnusedElaboratable=no
 """Proofs about spans of the quotient method: each pixel has the words of its own span, and none is lost.
 
-Words have few bits, and the multipliers are true ones. So a start that meets the differences of another span,
-or differences that are overwritten, give words that are refuted.
+Words have few bits, and the multipliers compute true products. If a start meets the differences of another
+span, or if differences are overwritten, the words are wrong. Then a claim is refuted.
 """
 
 from dataclasses import dataclass
@@ -23,21 +23,25 @@ from .rules import answers, pixels_follow, stays, taken
 pytestmark = pytest.mark.prove
 
 LENGTH_BITS, BITS = 2, 2
-"""Of lengths, and of components."""
+"""Bits of lengths, and of components."""
 
 
 @dataclass(frozen=True)
 class FewBits(QuotientSpans):
-    """Squares of one fraction bit more than products have, as their differences are halved."""
+    """Formats for words of few bits.
+
+    Squares have one fraction bit more than products, because their differences are halved.
+    """
 
     @property
     def square_format(self):
-        """12 bits."""
+        """The format of squares has 12 bits."""
         return SQ(-24, 35)
 
 
 class ShortSpansUnit(wiring.Component):
-    """The unit with x and z of `BITS` bits, y = 0, exponents 0 and 1, ``l = x + z``, and few starts."""
+    """The unit with x and z of `BITS` bits, y = 0, exponents 0 and 1, ``l = x + z``, and room for few
+    starts."""
 
     def __init__(self):
         self.model = FewBits()
@@ -77,7 +81,7 @@ DEPTH = 4
 
 
 def words_of(span, place):
-    """m, w, l and z of a pixel of a span, from its vectors alone; a product is one of few bits."""
+    """m, w, l and z of a pixel, computed from the vectors of its span alone. Each product has few bits."""
     e = span.exponent
 
     def shifted(value):
@@ -101,17 +105,20 @@ def words_of(span, place):
 
 
 def pairs(place):
-    """``i (i - 1)/2``"""
+    """``place (place - 1)/2``"""
     return Mux(place == 3, 3, place == 2)
 
 
 def times(value, count):
-    """Product with 0 to 3."""
+    """Product of a value and a count of 0 to 3."""
     return Mux(count[0], value, 0) + Mux(count[1], value << 1, 0)
 
 
 def of_spans(*, multiplies=False, held=True):
-    """Spans of 1 to 3 pixels; a span that was offered stays until it is accepted, but may pause."""
+    """A harness for spans of 1 to 3 pixels.
+
+    An offered span stays until it is accepted, and the offer may pause.
+    """
     h = Harness(unit := ShortSpansUnit(), multiplies=multiplies)
     h.assume(unit.i.payload.length != 0)
     if held:
@@ -120,7 +127,7 @@ def of_spans(*, multiplies=False, held=True):
 
 
 def hold_payload(h):
-    """Assume that a span that was offered stays until it is accepted."""
+    """Assume that an offered span stays until it is accepted."""
     source, given = h.unit.i, Value.cast(h.unit.i.payload)
     offered, before = Signal(), Signal.like(given)
     h.m.d.sync += [offered.eq((offered | source.valid) & ~taken(source)), before.eq(given)]
@@ -128,7 +135,8 @@ def hold_payload(h):
 
 
 def of_words(*, held=True):
-    """Each pixel of any span has the words of that span alone; and its bit differs from the span before."""
+    """Claim that each pixel of any span has the words of this span alone, and that its bit differs from the
+    span before."""
     h = of_spans(multiplies=True, held=held)
     unit, before = h.unit, Signal()
     with h.m.If(taken(unit.o)):
@@ -145,7 +153,7 @@ def of_words(*, held=True):
 
 
 def of_progress():
-    """While a pixel is to come and the output is ready, a pixel leaves in as many cycles as the latency."""
+    """Claim that pixels leave while the output is ready, at most as many cycles apart as the latency."""
     h = of_spans()
     unit = h.unit
     owed = pixels_follow(h, unit.i, unit.o, unit.i.payload.length, unit.spans.spans_inside * LONGEST)
@@ -154,11 +162,15 @@ def of_progress():
 
 
 CYCLES = 12
-"""From power-up, of what is not decided in time for runs of any length; each one more doubles the time."""
+"""Cycles from power-up, for claims that are not decided in time for runs of any length.
+
+Each further cycle doubles the time.
+"""
 
 
 def test_words(prove):
-    """Spans of 1 to 3 pixels, in `CYCLES`: each pixel leaves once, in order, with the words of its span.
+    """Within `CYCLES`, for spans of 1 to 3 pixels: each pixel leaves once and in order, with its span's
+    words.
 
     So no start is taken before its differences, no differences are overwritten, and no start is lost.
     """
@@ -166,15 +178,15 @@ def test_words(prove):
 
 
 def test_progress(prove):
-    """In `CYCLES`: pixels leave without a pause longer than the latency."""
+    """Within `CYCLES`: pixels leave without a pause longer than the latency."""
     prove(of_progress(), CYCLES)
 
 
 def test_stability_and_admission(prove):
-    """Inductive: what waits stays; a span is accepted in 12 cycles while the output is ready.
+    """By induction: a beat that waits does not change, and a ready output accepts a span within 12 cycles.
 
-    These are its three turns, and three spans of three pixels before it, until so small a memory tells of
-    room.
+    These are the three turns of the span, and three spans of three pixels before it, until the small memory
+    has room.
     """
     h = of_spans()
     stays(h, h.unit.o)
@@ -190,15 +202,15 @@ BUGS = {
 
 @pytest.mark.parametrize("bug", BUGS)
 def test_bugs_are_found(refute, inject, bug):
-    """Injected in the unit, each refutes the claims on words."""
+    """Each bug, injected in the unit, refutes a claim on words."""
     inject(QuotientSpansUnit, *BUGS[bug])
     refute(of_words(), CYCLES)
 
 
 def of_waiting(serial=False):
-    """Differences that wait, second and first ones, are the same as a cycle before if they waited then.
+    """Claim that first and second differences do not change while they wait.
 
-    In spans of 4 pixels and more second ones may wait, too.
+    In spans of 4 pixels and more second differences may wait, too.
     """
     h = Harness(QuotientSpansUnit(length_bits=LENGTH_BITS + 1, serial=serial))
     if serial:
@@ -213,18 +225,27 @@ def of_waiting(serial=False):
 
 @pytest.mark.parametrize("serial", [False, True])
 def test_differences_that_wait_stay(prove, serial):
-    """Inductive, of the whole unit: none is overwritten before it is taken; nor is a serial setup's start."""
+    """By induction, for the whole unit: no differences are overwritten before they are taken.
+
+    A serial setup's start is not overwritten either.
+    """
     prove(of_waiting(serial))
 
 
 def test_overwritten_differences_are_found(refute, inject):
-    """Without the stall that holds second ones off until the first ones before them are taken."""
+    """The unit has a stall that holds second differences until the first differences before them are taken.
+
+    Without it a claim is refuted.
+    """
     inject(QuotientSpansUnit, "_set_up", "(at_coarse[0] & first[1]) | ", "")
     refute(of_waiting(), 30)
 
 
 def test_an_early_turn_is_found(refute, inject):
-    """A turn of the serial setup that does not wait for the words of its kind before to be taken."""
+    """A turn of the serial setup has to wait until the words of its kind are taken.
+
+    If it does not wait, a claim is refuted.
+    """
     inject(
         QuotientSpansUnit,
         "_set_up_serially",
@@ -235,5 +256,5 @@ def test_an_early_turn_is_found(refute, inject):
 
 
 def test_a_span_that_changes_is_found(refute):
-    """A span that changes between its turns refutes them: so its source has to hold the payload."""
+    """A span that changes between its turns refutes the claim. So its source has to hold the payload."""
     refute(of_words(held=False), CYCLES)

@@ -1,4 +1,4 @@
-"""Proof that x and D of the recurrence never wrap, over whole spans of any step."""
+"""Proof that x and D of the recurrence never wrap, in whole spans of any step."""
 
 from itertools import product
 
@@ -17,21 +17,21 @@ pytestmark = [pytest.mark.prove, pytest.mark.seldom]
 
 LENGTH = (1 << Recurrence.LENGTH_BITS) - 1
 WIDEST_BEND = 2.02
-"""Of c, for steps to 90 degrees: 2, and 1 %."""
+"""Largest c, for steps of up to 90 degrees: 2, plus 1 %."""
 
 
 def squared_norm(x, difference, c):
-    """``N^2 = D^2 + c x D + c x^2``, which is ``(D + c x/2)^2 + (c - c^2/4) x^2``, of 0 < c < 4."""
+    """``N^2 = D^2 + c x D + c x^2``, which is ``(D + c x/2)^2 + (c - c^2/4) x^2``, for 0 < c < 4."""
     return difference * difference + c * x * difference + c * x * x
 
 
 def most_at_start(c):
-    """Largest N that start values may have: that of an amplitude of 1, 1 % more, and 2^-30.
+    """Largest N of start values: the N of an amplitude of 1, plus 1 %, plus 2^-30.
 
-    ``x(k) = A cos(phase - k d)`` has ``N = A sin d``, and ``sin d = sqrt(c - c^2/4)``. A is that of unit
-    vectors, but the lengths of codes are off. The difference of two ends, hardly longer than that, then
-    points along them and not across: A is up to ``sqrt(1 + 2 e/sin d)``, never over sqrt 2. The rest is for
-    roundings of the words, and for steps so small that the word of c is 0.
+    ``x(k) = A cos(phase - k d)`` has ``N = A sin d``, and ``sin d = sqrt(c - c^2/4)``. A is the amplitude of
+    unit vectors, but the lengths of codes are off. If the difference of two ends is hardly longer than these
+    errors, it points along the ends and not across. So A is up to ``sqrt(1 + 2 e/sin d)``, and at most sqrt
+    2. The rest is for roundings of the words, and for steps so small that the word of c is 0.
     """
     sine = np.sqrt(c - c * c / 4)
     with np.errstate(divide="ignore"):
@@ -40,9 +40,11 @@ def most_at_start(c):
 
 
 def of_one_step(unit, monkeypatch, shift):
-    """A step of the model, for every K, is ``x' = x + D'``, ``D' = D - c x + e``: c, and a bound of |e|.
+    """A step of the model is ``x' = x + D'``, ``D' = D - c x + e``.
 
-    The register holds x with half a step of the operand.
+    The result is c for every K, and a bound of |e|.
+
+    The register holds x plus half a step of the operand.
     """
     monkeypatch.setattr(Format, "wrap", lambda _, codes: codes)
     factor = np.arange(unit.coefficient_format.max_code + 1)
@@ -58,23 +60,23 @@ def of_one_step(unit, monkeypatch, shift):
     for sums in (total, difference):
         np.testing.assert_array_equal(sums.parts[d], 1)
     e = np.abs(np.array(difference.rest) - c * unit._half_operand).max(axis=0) / one
-    # But for roundings of float64, half a step of the operand, and a cut.
+    # e has the roundings of float64, half a step of the operand, and a cut.
     assert (e <= (c * 2.0 ** -(unit.fraction_bits + 1) + 1 / one) * (1 + 2.0**-40)).all()
     return c, e
 
 
 def largest_words(c, e):
-    """Bounds of |x| and |D| at every pixel of every span, whose start values keep `most_at_start`.
+    """Bounds of |x| and |D| at every pixel of every span whose start values keep `most_at_start`.
 
-    Without e a step leaves N as it is, so with it N grows by ``N(0, e) = |e|`` at most, as N is a norm.
-    That bounds ``x <= N / sqrt(c - c^2/4)`` and ``D <= N / sqrt(1 - c/4)``. For the smallest c, where a step
-    of the word is more than what bends, sums of absolute values do better.
+    A step without e does not change N, and N is a norm. So a step with e adds at most ``N(0, e) = |e|``. This
+    gives ``x <= N / sqrt(c - c^2/4)`` and ``D <= N / sqrt(1 - c/4)``. For the smallest c a step of the word
+    is larger than c. Sums of absolute values then give smaller bounds.
     """
     flat = np.sqrt(1 - c / 4)
     start = most_at_start(c)
     with np.errstate(divide="ignore"):
         x = (start + LENGTH * e) / np.sqrt(c - c * c / 4)
-    # As long as |x| is under 2.
+    # This bound holds as long as |x| is under 2.
     steepest = start / flat + LENGTH * (2 * c + e)
     farthest = 1.01 + LENGTH * steepest
     small = farthest < np.minimum(x, 2)
@@ -82,7 +84,7 @@ def largest_words(c, e):
 
 
 def of_spans(unit, monkeypatch, format=None):
-    """x, with half a step of the operand, and D fit the format."""
+    """Check that D, and x plus half a step of the operand, fit the format."""
     format = format or unit.state_format
     for shift in range(1 << unit.SHIFT_BITS):
         c, e = of_one_step(unit, monkeypatch, shift)
@@ -94,7 +96,7 @@ def of_spans(unit, monkeypatch, format=None):
 
 
 def is_invariant(change):
-    """Whether a step of no e leaves N. Of degree 2 in x, D and c, it does if it does on 3 x 3 x 3 points."""
+    """Whether a step without e keeps N. N has degree 2 in x, D and c, so 3 x 3 x 3 points are enough."""
     return all(
         squared_norm(x + d, d - change * c * (x + d), c) == squared_norm(x, d, c)
         for x, d, c in product(range(3), repeat=3)
@@ -102,24 +104,27 @@ def is_invariant(change):
 
 
 def test_a_step_leaves_the_norm():
-    """A step the other way, or of half the bend, does not."""
+    """A step with the opposite sign of c, or with another multiple of c, does not keep N."""
     assert [change for change in (-1, 0, 0.5, 1, 2) if is_invariant(change)] == [1]
 
 
 @pytest.mark.parametrize("guard_bits", [20, 28])
 def test_x_and_d_never_wrap(monkeypatch, guard_bits):
-    """Every word of K and every shift, steps to 90 degrees, to 4095 pixels, for one phase or each of four."""
+    """Check every word of K and every shift, for steps of up to 90 degrees and up to 4095 pixels.
+
+    The recurrence has one phase, or four.
+    """
     of_spans(Recurrence(guard_bits=guard_bits), monkeypatch)
 
 
 def test_words_a_bit_too_short_are_found(monkeypatch):
-    """An integer bit less."""
+    """With an integer bit fewer, words wrap."""
     with pytest.raises(AssertionError, match=" wraps in "):
         of_spans(Recurrence(), monkeypatch, SQ(1, 44))
 
 
 def test_words_that_drift_are_found(monkeypatch):
-    """What the shortest words cut of each step adds up, so that long spans of small steps do wrap."""
+    """With the shortest words the cuts of all steps add up, so long spans of small steps wrap."""
     unit = Recurrence(fraction_bits=8, guard_bits=10)
     with pytest.raises(AssertionError, match=r"x to .* wraps in "):
         of_spans(unit, monkeypatch)
@@ -138,14 +143,14 @@ BUGS = {
 
 @pytest.mark.parametrize("bug", BUGS)
 def test_bugs_are_found(inject, monkeypatch, bug):
-    """Injected in the model, each breaks what is said of a step."""
+    """Each bug, injected in the model, breaks a statement about a step."""
     inject(Recurrence, "_reinsch", *BUGS[bug])
     with pytest.raises(AssertionError):
         of_one_step(Recurrence(), monkeypatch, 3)
 
 
 def share_at_start(unit, first, second, coefficient, shift):
-    """Largest N of start values by what it may be, and |x| by the same."""
+    """Largest N and |x| of start values, divided by their bounds."""
     if unit.interleave > 1:
         coefficient, shift = coefficient[:, np.newaxis], shift[:, np.newaxis]
     c = coefficient.values * 2.0 ** (2 - shift)
@@ -156,11 +161,12 @@ def share_at_start(unit, first, second, coefficient, shift):
 
 @pytest.mark.parametrize("interleave", [1, 4])
 def test_stated_start_values_keep_the_bound(interleave):
-    """Those of any amplitude to ``1 - 2^-16``, any phase, and steps from none to 90 degrees."""
+    """Start values of any amplitude up to ``1 - 2^-16`` and any phase keep the bounds, for steps of 0 to 90
+    degrees."""
     rng, unit = np.random.default_rng(1), Recurrence(interleave=interleave)
     step = np.r_[0, np.pi / 2 * 10.0 ** rng.uniform(-13, 0, 100_000), np.pi / 2]
     if interleave > 1:
-        # Of longer steps nothing reads the second values.
+        # In longer steps no pixel reads the second values.
         step /= interleave
     amplitude = (1 - 2.0**-16) * rng.choice([-1, 1, 0.1], len(step))
     start = unit.start(amplitude, rng.uniform(0, 2 * np.pi, len(step)), step)
@@ -168,7 +174,8 @@ def test_stated_start_values_keep_the_bound(interleave):
 
 
 def test_start_values_of_the_setup_keep_the_bound():
-    """Unit vectors to 90 degrees apart; and those one or two codes apart, whose A may be sqrt 2."""
+    """Start values of unit vectors keep the bounds: up to 90 degrees apart, and one or two codes apart, where
+    A may be sqrt 2."""
     rng = np.random.default_rng(2)
     setup = RecurrenceSetup()
     # Shorter spans read no second values, or no coefficient.

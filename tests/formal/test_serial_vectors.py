@@ -1,5 +1,5 @@
 # amaranth: UnusedElaboratable=no
-"""Proofs about the serial vectors: no pixel of a span is lost or drawn twice, no piece is lost."""
+"""Proofs about the serial vectors: no pixel of a span is lost or drawn twice, and no piece is lost."""
 
 import pytest
 from amaranth.hdl import Mux, Signal
@@ -16,7 +16,10 @@ PHASES = "loads", "settles", "repeats", "tests", "starts", "steps", "renews"
 
 
 def of_pixels():
-    """A model has the pixels that are owed and the column of the first of them, until a piece's last turn."""
+    """Claims on pixels.
+
+    Until a piece's last turn, a model holds the pixels that are owed and the column of the first of them.
+    """
     h = Harness(SerialVectorsUnit())
     given = h.unit.i
     h.assume(~given.valid | given.payload.length.any())
@@ -35,7 +38,7 @@ def of_pixels():
         ]
     with h.m.Elif(ends):
         h.m.d.sync += [owed.eq(owed - pixels), column.eq(Mux(from_the_right, column, column + pixels))]
-    # What the piece has to be, from its first turn on.
+    # The piece that is due, from its first turn on.
     length, first = Signal(PIXEL_BITS, name="length"), Signal(PIXEL_BITS, name="first")
     with h.m.If(starts & ~place.any()):
         h.m.d.sync += [
@@ -50,19 +53,19 @@ def of_pixels():
     h.claim(~busy | ((right == from_the_right) & (whole == (pixels == left))))
     h.claim(~((starts & place.any()) | steps) | ((pixels == length) & (result.length == length)))
     h.claim(~((starts & place.any()) | steps) | (result.x == first))
-    # A span is taken when all pixels of the one before have left, or leave.
+    # A span is taken when all pixels of the span before have left, or are leaving.
     h.claim(~(taken(given) & place.all()) | loads | (ends & (pixels == owed)))
     return h
 
 
 @pytest.mark.seldom
 def test_pixels_are_those_of_the_span(prove):
-    """Inductive: pieces are the span's pixels, in their order from the long edge, each once."""
+    """By induction: the pieces have the span's pixels, in order from the long edge and once each."""
     prove(of_pixels())
 
 
 def of_pieces():
-    """A piece is owed from its last component on; until it was taken no other takes its place."""
+    """Claim that a piece, from its last component on, is not replaced until it is taken."""
     h = Harness(SerialVectorsUnit())
     starts, steps, place, overlaps = (h.register(name) for name in ("starts", "steps", "place", "overlaps"))
     owed = Signal(name="owed")
@@ -78,7 +81,7 @@ def of_pieces():
 
 
 def test_each_piece_leaves_before_the_next(prove):
-    """Inductive."""
+    """By induction."""
     prove(of_pieces())
 
 
@@ -91,6 +94,7 @@ def test_each_piece_leaves_before_the_next(prove):
     ],
 )
 def test_bugs_are_found(refute, inject, function, text, bug):
-    """What is left of a span is forgotten; a piece is longer than the span; a piece comes again."""
+    """Three bugs are found: the rest of a span is forgotten, a piece is longer than the span, a piece comes
+    again."""
     inject(SerialVectorsUnit, function, text, bug)
     refute(of_pixels())

@@ -1,9 +1,11 @@
 # amaranth: UnusedElaboratable=no
-"""Proof that each sample of a shared edge is drawn exactly once: two triangles walked side by side.
+"""Proof that each sample of a shared edge is drawn exactly once, with two triangles that are walked side by
+side.
 
-The edge is the long edge, on the right, of one, and the upper short edge, on the left, of the other. The
-edge setup gives both the same numbers, as the corners of an edge go in from top to bottom whatever the
-triangle; everything else of the triangles is free. Reduced are the scanlines of the edge, to `ROWS`.
+The edge is the long edge of one triangle, on its right, and the upper short edge of the other triangle, on
+its left. The edge setup gives both the same numbers, because it takes the corners of an edge from top to
+bottom in every triangle. Everything else of both triangles is free. Only the number of scanlines of the edge
+is reduced, to `ROWS`.
 """
 
 import pytest
@@ -21,13 +23,13 @@ pytestmark = pytest.mark.prove
 
 GRID, ROWS = Grid(4), 3
 LONG, UPPER = 0, 1
-"""Edges of what is walked."""
+"""Edges of a triangle in the walk."""
 
 OF_AN_EDGE = "x", "error", "step", "error_step", "height"
 
 
 class Neighbours(wiring.Component):
-    """Two walks that begin on the same cycle."""
+    """Two walks that begin in the same cycle."""
 
     i: In(stream.Signature(data.StructLayout({"left": walk_shape(GRID), "right": walk_shape(GRID)})))
     constants: In(frame_shape())
@@ -61,13 +63,13 @@ def covers_its_end(row, sample):
 
 
 def of_neighbours(covers):
-    """Claims on the scanlines that both have."""
+    """Claims on the scanlines that both triangles have."""
     harness = Harness(unit := Neighbours())
     left, right = unit.i.payload.left, unit.i.payload.right
     for name in OF_AN_EDGE:
         harness.assume(left[name][LONG] == right[name][UPPER])
     rows = left.upper + left.lower
-    # As the edge setup tells it: the upper edge has no scanlines.
+    # The edge setup gives this if the upper edge has no scanlines.
     for triangle in (left, right):
         harness.assume(triangle.flat == (triangle.upper == 0))
     harness.assume((left.first == right.first) & (rows == right.upper) & (rows != 0) & (rows <= ROWS))
@@ -82,7 +84,7 @@ def of_neighbours(covers):
 
 
 def walks_on(harness):
-    """To be refuted: that both never have a scanline in common that is not their first."""
+    """Claim that both triangles have no common scanline after the first. This claim is to be refuted."""
     other, seen = harness.without_claims(), Signal()
     other.m.d.sync += seen.eq(harness.unit.both)
     other.claim(~(seen & harness.unit.both))
@@ -90,11 +92,14 @@ def walks_on(harness):
 
 
 CYCLES = 10
-"""In which a counterexample is looked for."""
+"""Cycles in which a counterexample is searched."""
 
 
 def test_each_sample_is_drawn_once(prove, refute):
-    """Inductive: any pairs one after the other; and both do walk on."""
+    """By induction, for any pairs of triangles one after the other.
+
+    A second claim, which is refuted, shows that both walk on.
+    """
 
     harness = of_neighbours(covers)
     prove(harness)
@@ -102,12 +107,12 @@ def test_each_sample_is_drawn_once(prove, refute):
 
 
 def test_an_end_that_counts_twice_is_found(refute):
-    """``>=`` in place of ``>`` at the right end."""
+    """``>=`` in place of ``>`` at the right end is found."""
     refute(of_neighbours(covers_its_end), CYCLES)
 
 
 def test_another_rounding_of_the_long_edge_is_found(refute, inject):
-    """``>`` in place of ``>=`` where the long edge carries."""
+    """``>`` in place of ``>=`` at the carry of the long edge is found."""
     fault = "edge.carry.eq(less > 0 if name == 'long' else less >= 0)"
     inject(EdgeWalkUnit, "_edge", "edge.carry.eq(less >= 0)", fault)
     refute(of_neighbours(covers), CYCLES)

@@ -14,7 +14,7 @@ pytestmark = pytest.mark.prove
 
 
 def of_pixels():
-    """A model has the pixels that are owed and the column of the first of them."""
+    """Claims on pixels. A model holds the pixels that are owed and the column of the first of them."""
     h = Harness(SpanHalverUnit())
     given, found = h.unit.i, h.unit.o
     h.assume(~given.valid | given.payload.length.any())
@@ -31,7 +31,7 @@ def of_pixels():
         h.m.d.sync += [owed.eq(owed - length), column.eq(Mux(right, column, column + length))]
     first = Mux(right, column + owed - length, column)[:PIXEL_BITS]
     h.claim(~taken(found) | (length.any() & (length <= owed) & (found.payload.x == first)))
-    # A span is taken when all pixels of the one before have left, or leave.
+    # A span is taken when all pixels of the span before have left, or are leaving.
     h.claim(~taken(given) | ~owed.any() | (taken(found) & (length == owed)))
     valid, left, pixels, whole, x = (h.register(name) for name in ("valid", "left", "pixels", "whole", "x"))
     h.claim(valid == owed.any())
@@ -42,12 +42,15 @@ def of_pixels():
 
 
 def test_pixels_are_those_of_the_span(prove):
-    """Inductive: pieces are the span's pixels, in their order from the long edge, each once."""
+    """By induction: the pieces have the span's pixels, in order from the long edge and once each."""
     prove(of_pixels())
 
 
 def of_waiting():
-    """Registers of a piece that waits keep their words; the piece is a function of them alone."""
+    """Claim that registers of a piece that waits keep their words.
+
+    The piece is a function of these registers alone.
+    """
     h = Harness(SpanHalverUnit())
     found, waits = h.unit.o, Signal(name="waits")
     ends = (f"{name}_{k}" for name in ("near", "far", "last", "step") for k in range(ATTRIBUTES))
@@ -61,7 +64,7 @@ def of_waiting():
 
 
 def test_a_piece_that_waits_stays(prove, refute, inject):
-    """Inductive; and what leaves without being taken is found."""
+    """By induction. A piece that leaves without being taken is found."""
     prove(of_waiting())
     inject(SpanHalverUnit, "elaborate", "leaves.eq(self.o.valid & self.o.ready)", "leaves.eq(self.o.valid)")
     refute(of_waiting())
@@ -72,6 +75,7 @@ def test_a_piece_that_waits_stays(prove, refute, inject):
     [("valid.eq(~whole)", "valid.eq(0)"), ("pixels.eq(shorter(pixels))", "pixels.eq(pixels)")],
 )
 def test_bugs_are_found(refute, inject, text, bug):
-    """What is left of a span is forgotten; a piece is longer than the span."""
+    """Three bugs are found: the rest of a span is forgotten, a piece is longer than the span, a piece comes
+    again."""
     inject(SpanHalverUnit, "elaborate", text, bug)
     refute(of_pixels())

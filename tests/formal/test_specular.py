@@ -1,4 +1,5 @@
-"""Proofs of the specular unit: what it reads, by SAT; its term never rises and ends, by exhaustion."""
+"""Proofs of the specular unit: SAT proves its argument; exhaustion proves that its term never rises and
+ends."""
 
 import numpy as np
 import pytest
@@ -23,17 +24,17 @@ MODELS = [
     pytest.param(name, marks=[pytest.mark.seldom] * (name not in (SPECULAR_MODELS[0], *KINDS)))
     for name in SPECULAR_MODELS + FURTHER_MODELS
 ]
-"""All that the unit serves; CI proves the first, and one of each kind."""
+"""All models that the unit serves. CI proves the first model, and one of each kind."""
 
-# All but those of the first model and operand: small ones, those next to a power of two, where the scale
-# jumps, and others.
+# Exponents of all pairs of model and operand but the first: small exponents, those next to a power of two,
+# where the scale jumps, and some others.
 SOME = sorted(
     {*range(1, 12), *(2**k + step for k in range(4, 10) for step in (-1, 0, 1)), 100, 777, 999, 1000}
 )
 
 
 def assignments(statements):
-    """All of them, those under a condition too."""
+    """All assignments, also those under a condition."""
     for statement in statements:
         if isinstance(statement, Switch):
             for _, inner, _ in statement.cases:
@@ -43,7 +44,8 @@ def assignments(statements):
 
 
 def words_of(unit, fragment):
-    """Registers of the data path by name; which are made of ``1 - cos gamma``; which of a beat, but that."""
+    """Registers of the data path by name; names of those computed from ``1 - cos gamma``; names of the other
+    registers computed from a beat."""
     (path,) = (inner for inner, name, _ in fragment.subfragments if name == "datapath")
     found = [one for statements in path.statements.values() for one in assignments(statements)]
     words = {signal.name: signal for one in found for signal in one.lhs._lhs_signals()}
@@ -56,14 +58,16 @@ def words_of(unit, fragment):
 
 
 def reads_one_word(unit, name):
-    """All that is made of the operand is ``1 - cos gamma``, of which one register is made."""
+    """Check that the operand is used only for ``1 - cos gamma``, and that only one register is computed from
+    it."""
     _, made_of_operand, others = words_of(unit, Fragment.get(unit, None))
     assert made_of_operand == {name}, "more is made of 1 - cos gamma"
     assert len(others) == 1, "more is made of the operand"
 
 
 def of_argument(unit, name, format, if_dark):
-    """That register has it two cycles on, cut and limited, and a code of its own if the beat is dark."""
+    """Claim that this register has the cut and limited argument two cycles later, or its own code for a dark
+    beat."""
     h = Harness(unit)
     words, _, (dark,) = words_of(unit, h._fragment)
     argument, first, dark = words[name], words["one_minus_cosine"], words[dark]
@@ -90,10 +94,11 @@ def of_specular(model, operand):
 
 
 def every_argument(unit, exponent):
-    """Up to a shifted argument of 2, the first of all arguments that the unit cannot tell from it; then some.
+    """One argument for each group that the unit cannot tell apart, up to a shifted argument of 2, and some
+    larger arguments.
 
-    What it reads are the bits of the shifted argument, and of ``coscos`` those that address its first table.
-    Past 2 every term is 0.
+    The unit reads the bits of the shifted argument, and for ``coscos`` those bits that address its first
+    table. Beyond 2 every term is 0.
     """
     _, shift = unit.scale(np.int64(exponent))
     step = 1 << min(9 - int(shift), 8 if unit.is_coscos else 9)
@@ -104,7 +109,10 @@ def every_argument(unit, exponent):
 
 
 def operands(unit, arguments):
-    """Operands of the arguments: of a cosine both ends of those that have each, and of the whole word."""
+    """Operands of the arguments.
+
+    If the operand is a cosine: both ends of the cosines of each argument, and both ends of the word.
+    """
     if unit.operand == "one_minus_cosine":
         return arguments
     step = 1 << unit.operand_format.fraction_bits - unit.ARGUMENT_FORMAT.fraction_bits
@@ -113,10 +121,10 @@ def operands(unit, arguments):
 
 
 def check(unit, exponent):
-    """No term is larger than that of a smaller argument; all are the model's.
+    """Check terms: no term is larger than that of a smaller argument, and all equal the model's terms.
 
-    It is 0 where the exact one is under 2^-14, and not where that is over it, but for a hundredth of that;
-    and 0 for a dark beat at the peak.
+    A term is 0 where the exact term is under 2^-14, and over 0 where the exact term is larger; a hundredth of
+    2^-14 is left open. A dark beat at the peak has the term 0.
     """
     model = unit.model
     codes = operands(model, every_argument(model, exponent))
@@ -138,10 +146,11 @@ def check(unit, exponent):
 @pytest.mark.parametrize("operand", OPERANDS)
 @pytest.mark.parametrize("model", MODELS)
 def test_term_follows_from_the_argument(prove, model, operand):
-    """Inductive, for every operand: ``1 - cos gamma``, cut and limited, is all that a term is made of.
+    """By induction, for every operand: a term depends only on ``1 - cos gamma``, cut and limited.
 
-    So it never rises with the cosine, and where the operand is 1 - cos gamma it is that operand: what holds
-    of the terms of every argument holds for both. A dark beat has the argument 0.
+    So the term never rises while the cosine falls. If the operand is 1 - cos gamma, it is the argument
+    itself. So statements about the terms of all arguments hold for both operands. A dark beat has the
+    argument 0.
     """
     reads_one_word(SpecularUnit(Specular(REFLECTION_MODELS[model], operand)), "argument")
     prove(of_specular(model, operand))
@@ -150,7 +159,10 @@ def test_term_follows_from_the_argument(prove, model, operand):
 @pytest.mark.parametrize("operand", OPERANDS)
 @pytest.mark.parametrize("model", MODELS)
 def test_term_never_rises(model, operand):
-    """Every argument; every exponent for the first model and 1 - cos gamma, `SOME` for the others."""
+    """Every argument is tried.
+
+    The first model with 1 - cos gamma has every exponent, the others have `SOME`.
+    """
     unit = SpecularUnit(Specular(REFLECTION_MODELS[model], operand))
     is_first = (model, operand) == (SPECULAR_MODELS[0], "one_minus_cosine")
     for exponent in range(1, 1001) if is_first else SOME:
@@ -171,13 +183,13 @@ BUGS_OF_ARGUMENT = {
 
 @pytest.mark.parametrize("bug", BUGS_OF_ARGUMENT)
 def test_bugs_of_the_argument_are_found(refute, inject, bug):
-    """Injected in the unit, each refutes the claims."""
+    """Each bug, injected in the unit, refutes a claim."""
     inject(*BUGS_OF_ARGUMENT[bug])
     refute(of_specular("cosquad", "cosine"), 4)
 
 
 def test_bug_of_another_word_is_found(inject):
-    """What is shifted is made of the argument and the operand, injected in the unit."""
+    """A shifted word that also depends on the operand, injected in the unit, is found."""
     text = 'g.register("shifted_wide", shifted, argument'
     bug = 'g.register("shifted_wide", lambda x, _: shifted(x), argument, operand'
     inject(SpecularUnit, "_describe", text, bug)
@@ -218,7 +230,7 @@ BUGS = {
 @pytest.mark.parametrize("operand", OPERANDS)
 @pytest.mark.parametrize("bug", BUGS)
 def test_bugs_are_found(inject, bug, operand):
-    """Injected in the unit, each breaks a claim."""
+    """Each bug, injected in the unit, breaks a claim."""
     text, change, claim = BUGS[bug]
     inject(SpecularUnit, "_describe", text, change)
     unit = SpecularUnit(Specular(REFLECTION_MODELS["cosquad"], operand))

@@ -1,4 +1,5 @@
-"""Proofs of what every streaming unit shares: skid buffers, register slices, FIFOs, pixel counters."""
+"""Proofs of the parts that all streaming units share: skid buffers, register slices, FIFOs, pixel
+counters."""
 
 import itertools
 
@@ -22,7 +23,8 @@ TAG = unsigned(2)
 
 
 class Delay(PipelinedUnit):
-    """A tag through registers, one a clock of latency; of a result that stands one an interval."""
+    """A unit that sends a tag through registers, one for each cycle of latency; if the result stands, one for
+    each interval."""
 
     def __init__(self, latency, initiation_interval=1, stands=False):
         super().__init__(TAG, TAG, latency=latency, initiation_interval=initiation_interval, stands=stands)
@@ -36,7 +38,7 @@ class Delay(PipelinedUnit):
             return operands
         stages = self.latency
         if self.initiation_interval > 1:
-            # Read as late as the operand stays.
+            # The register is read as late as the operand stays.
             stage = min(self.initiation_interval, self.latency - 1)
             if stage:
                 operands = self.register(m, operands, "late", when=self.at(stage))
@@ -47,7 +49,7 @@ class Delay(PipelinedUnit):
 
 
 class Chain(wiring.Component):
-    """Streams in a row, connected by a function of the module, the number, and both streams."""
+    """Streams in a row. A function of the module, the number and both streams connects each pair."""
 
     def __init__(self, connect, count=1):
         self.connect, self.count = connect, count
@@ -89,7 +91,8 @@ def equal(came, leaves):
 
 
 def of_stream(unit, capacity, latency, distance):
-    """What is claimed of every stream: a beat leaves in ``latency`` cycles, one is taken in ``distance``."""
+    """Claims on every stream: a beat leaves within ``latency`` cycles, and a beat is taken within
+    ``distance`` cycles."""
     h = Harness(unit)
     stays(h, unit.o)
     inside = follows(h, unit.i, unit.o, capacity, equal)
@@ -102,11 +105,11 @@ TIMINGS = [(1, 1), (2, 1), (4, 1), (1, 2), (2, 2), (5, 2), (3, 4), (9, 4), (10, 
 
 
 STANDING = [(2, 2, True), (3, 2, True), (3, 4, True), (9, 4, True), (10, 7, True)]
-"""Of results that stand for a cycle more, without a spare register."""
+"""Timings of results that stand for one further cycle, without a spare register."""
 
 
 def of_delay(*timing):
-    """The claims of a stream, and those of the turns."""
+    """The claims of a stream, and the claims on turns."""
     unit = Delay(*timing)
     latency, interval = unit.latency, unit.initiation_interval
     h = of_stream(unit, -(-latency // interval) + 1, latency - 1, interval)
@@ -131,36 +134,40 @@ def of_delay(*timing):
 
 @pytest.mark.parametrize("timing", [*TIMINGS, *STANDING])
 def test_pipelined_unit(prove, timing):
-    """Inductive: stable, in order, none lost or invented, capacity, no deadlock, turns.
+    """By induction: the claims of a stream, and the claims on turns.
 
     A unit holds a beat for each interval of its latency, and one that waits. While the output is ready, a
-    beat that is inside leaves ``latency`` cycles later at most, and one that is offered is taken after
-    ``initiation_interval`` cycles at most. All ages move on every cycle but one after a clock on which a beat
-    was not taken; while a beat is inside, the next comes a whole multiple of the interval of such cycles on.
+    beat inside leaves after at most ``latency`` cycles, and an offered beat is taken after at most
+    ``initiation_interval`` cycles. Cycles count for all ages, except a cycle after a beat was not taken.
+    While a beat is inside, the next beat comes a whole multiple of the interval later, in cycles that count.
     """
     prove(of_delay(*timing))
 
 
 def test_a_result_that_does_not_stand_is_found(refute, inject):
-    """A register whose last cycle is that of the output: the next beat replaces a beat that waits."""
+    """A register whose last cycle is that of the output is found: the next beat replaces a beat that
+    waits."""
     inject(Delay, "datapath", "<= self.latency", "< self.latency")
     refute(of_delay(4, 2, True))
 
 
 def of_registers(count):
-    """Two beats inside each, one clock through it; a clock for its ready to come back through it, too."""
+    """Claims on a chain of register slices.
+
+    Each holds two beats and takes one cycle; its ready also takes a cycle back.
+    """
     return of_stream(Chain(registered, count), 2 * count, count - 1, count)
 
 
 @pytest.mark.parametrize("count", [1, 2, 3])
 def test_registers(prove, count):
-    """Inductive, for so many in a row: the claims of a stream."""
+    """By induction, for some slices in a row: the claims of a stream."""
     prove(of_registers(count))
 
 
 @pytest.mark.parametrize("depth", [3, 4, 6])
 def test_buffer(prove, depth):
-    """Inductive: the claims of a stream; ``depth`` beats inside, two cycles through."""
+    """By induction: the claims of a stream, with ``depth`` beats inside and two cycles of latency."""
     prove(of_stream(Chain(buffered(depth)), depth, 1, 1))
 
 
@@ -174,14 +181,14 @@ BUFFER_BUGS = {
 
 @pytest.mark.parametrize("bug", BUFFER_BUGS)
 def test_bugs_of_a_buffer_are_found(refute, inject, bug):
-    """Injected in `connect_fifo`, each refutes the claims of a stream."""
+    """Each bug, injected in `connect_fifo`, refutes a claim of a stream."""
     inject(blysk.hdl.core.stream, "connect_fifo", *BUFFER_BUGS[bug])
     refute(of_stream(Chain(buffered(3)), 3, 1, 1))
 
 
 @pytest.mark.parametrize("depth", [2, 3, 4])
 def test_wide_buffer(prove, depth):
-    """Inductive: the claims of a stream; ``depth`` beats inside, a cycle through."""
+    """By induction: the claims of a stream, with ``depth`` beats inside and one cycle of latency."""
     prove(of_stream(Chain(kept(depth)), depth, 0, 1))
 
 
@@ -195,18 +202,19 @@ WIDE_BUFFER_BUGS = {
 
 @pytest.mark.parametrize("bug", WIDE_BUFFER_BUGS)
 def test_bugs_of_a_wide_buffer_are_found(refute, inject, bug):
-    """Injected in `connect_wide_fifo`, each refutes the claims of a stream."""
+    """Each bug, injected in `connect_wide_fifo`, refutes a claim of a stream."""
     inject(blysk.hdl.core.memory, "connect_wide_fifo", *WIDE_BUFFER_BUGS[bug])
     refute(of_stream(Chain(kept(2)), 2, 0, 1))
 
 
 def of_late_buffer():
-    """Four in the memory, of which three may be on their way, and two behind it."""
+    """Four beats in the memory, of which three may be on their way, and two beats behind it."""
     return of_stream(Chain(late(4)), 6, 4, 7)
 
 
 def test_late_buffer(prove):
-    """Inductive: the claims of a stream; four cycles through, and one more where another is written."""
+    """By induction: the claims of a stream, with four cycles of latency, and one more if another beat is
+    written."""
     prove(of_late_buffer())
 
 
@@ -219,13 +227,16 @@ LATE_BUFFER_BUGS = {
 
 @pytest.mark.parametrize("bug", LATE_BUFFER_BUGS)
 def test_bugs_of_a_late_buffer_are_found(refute, inject, bug):
-    """Injected in `connect_late_fifo`, each refutes the claims of a stream."""
+    """Each bug, injected in `connect_late_fifo`, refutes a claim of a stream."""
     inject(blysk.hdl.core.memory, "connect_late_fifo", *LATE_BUFFER_BUGS[bug])
     refute(of_late_buffer(), 14)
 
 
 def test_a_proof_of_too_few_cycles_is_found(prove):
-    """Nothing that waited leaves in 6 cycles of a unit of 4: what is lost then is not seen."""
+    """In 6 cycles of a unit with 4 cycles of latency, no beat that waited can leave.
+
+    So a proof of 6 cycles would not see a lost beat.
+    """
     with pytest.raises(AssertionError, match="nothing moves on in 6 cycles"):
         prove(of_stream(Delay(4), 5, 3, 1), 6)
 
@@ -243,7 +254,7 @@ SKID_BUFFER_BUGS = {
 @pytest.mark.parametrize("bug", SKID_BUFFER_BUGS)
 @pytest.mark.parametrize("make", [lambda: of_delay(2, 1), lambda: of_registers(2)])
 def test_bugs_of_a_skid_buffer_are_found(refute, inject, make, bug):
-    """Injected in `skid_buffer`, each refutes the claims of a stream."""
+    """Each bug, injected in `skid_buffer`, refutes a claim of a stream."""
     for user in (blysk.hdl.core.stream, blysk.hdl.core.pipelined_unit):
         inject(user, "skid_buffer", *SKID_BUFFER_BUGS[bug])
     refute(make())
@@ -251,7 +262,7 @@ def test_bugs_of_a_skid_buffer_are_found(refute, inject, make, bug):
 
 @pytest.mark.parametrize("bug", ["moves while it holds", "forgets that it holds", "holds what was taken"])
 def test_bugs_without_a_spare_register_are_found(refute, inject, bug):
-    """The same where the result stands."""
+    """The same bugs are found if the result stands."""
     inject(blysk.hdl.core.pipelined_unit, "skid_buffer", *SKID_BUFFER_BUGS[bug])
     refute(of_delay(3, 2, True))
 
@@ -279,14 +290,17 @@ UNIT_BUGS = {
 
 @pytest.mark.parametrize("bug", UNIT_BUGS)
 def test_bugs_of_a_pipelined_unit_are_found(refute, inject, bug):
-    """Injected in `PipelinedUnit`, each refutes the claims of a stream or those of the turns."""
+    """Each bug, injected in `PipelinedUnit`, refutes a claim of a stream or a claim on turns."""
     timing, *change = UNIT_BUGS[bug]
     inject(PipelinedUnit, *change)
     refute(of_delay(*timing))
 
 
 def of_counter():
-    """A span of up to 7 pixels begins at any time that is allowed; a model counts those that are left."""
+    """Claims on a counter of pixels.
+
+    A span of up to 7 pixels begins at any allowed time, and a model counts its pixels that are left.
+    """
     h = Harness()
     length, valid, advance = h.free(3, "length"), h.free(name="valid"), h.free(name="advance")
     active, ends = blysk.hdl.core.stream.count_down(h.m, valid, length, advance)
@@ -300,7 +314,7 @@ def of_counter():
 
 
 def test_pixel_counter(prove):
-    """Inductive, lengths 0 to 7: active and ends are those of a model that counts, whatever the stalls."""
+    """By induction, for lengths 0 to 7: active and ends are those of the model, whatever the stalls."""
     prove(of_counter())
 
 

@@ -1,5 +1,5 @@
 # amaranth: UnusedElaboratable=no
-"""Proof about the texture sampler with a memory outside: its requests are a stream as others are."""
+"""Proof about the texture sampler with a memory outside: its requests keep the rules of a stream."""
 
 import pytest
 
@@ -14,7 +14,7 @@ pytestmark = pytest.mark.prove
 
 
 def test_requests_that_wait_stay(prove):
-    """Inductive: a valid request stays until it is accepted, whatever the answers do."""
+    """By induction: a valid request stays until it is accepted, whatever the answers do."""
     model = TextureSampler(TexelMemory(4, external=True), bilinear=False)
     unit = TextureSamplerUnit(model, waiting=4)
     h = Harness(unit)

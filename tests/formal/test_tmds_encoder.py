@@ -1,4 +1,4 @@
-"""Proof of the TMDS encoder's balance: what its lane has sent never leans further than the bound."""
+"""Proof of the TMDS encoder's balance: the disparity of its lane never exceeds the bound."""
 
 import pytest
 from amaranth.hdl import Cat, Mux, Signal, signed
@@ -12,10 +12,11 @@ pytestmark = [pytest.mark.prove, pytest.mark.seldom]
 
 
 def of_balance(bound):
-    """Ones less zeros of the words that left since the last control word, counted from the bits themselves.
+    """Claims on the disparity: ones less zeros of the words since the last control word, counted from the
+    bits themselves.
 
-    The display takes a word on every cycle.
-    The first claim leads the way: what the registers before the last one say of each other.
+    The display takes a word in every cycle. The first claim makes the proof inductive. It says how the
+    registers before the last register are related.
     """
     unit = TmdsEncoderUnit()
     h = Harness(unit)
@@ -34,12 +35,15 @@ def of_balance(bound):
 
 
 def test_balance(prove):
-    """Within the bound for every stream of symbols, pauses and resets; the bound less a step is refuted."""
+    """The disparity is within the bound for every stream of symbols, pauses and resets.
+
+    A bound one step smaller is refuted.
+    """
     prove(of_balance(MAX_DISPARITY))
 
 
 def test_a_smaller_bound_is_refuted(refute):
-    """The largest disparity is reached."""
+    """The largest disparity occurs."""
     refute(of_balance(MAX_DISPARITY - 1))
 
 
@@ -48,6 +52,6 @@ def test_a_smaller_bound_is_refuted(refute):
     [("xor + invert - 1", "xor - 1"), ("Mux(active, after, 0)", "after"), ("~xor, ", "xor, ")],
 )
 def test_bugs_are_found(refute, inject, text, bug):
-    """Injected in the unit, each refutes the claims."""
+    """Each bug, injected in the unit, refutes a claim."""
     inject(TmdsEncoderUnit, "datapath", text, bug)
     refute(of_balance(MAX_DISPARITY))

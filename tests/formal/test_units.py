@@ -1,5 +1,6 @@
 # amaranth: UnusedElaboratable=no
-"""Proofs about every unit of the records: beats that wait stay, are as many as came, and none is stuck."""
+"""Proofs about every unit of the records: a beat that waits does not change, beats are not lost, and none is
+stuck."""
 
 from functools import partial
 
@@ -23,7 +24,7 @@ from .rules import answers, stays, taken
 
 pytestmark = pytest.mark.prove
 
-# Of each record the default variant, and others that have another control.
+# Of each record the default variant, and other variants whose control differs.
 FURTHER = {
     "arccos": ("refitted, sequential",),
     "attributes": ("both, interval 3",),
@@ -47,12 +48,12 @@ UNITS = {
 }
 KINDS = {name: getattr(make, "func", make) for name, make in UNITS.items()}
 SELDOM = ("geometry", "render", "pixel_pipelines", "motion")
-"""Units whose proofs take minutes; their parts are proved, and they are held by runs of other tests."""
+"""Units whose proofs take minutes. Their parts are proved, and other tests run them."""
 SELDOM += OF_DOCUMENTS
 
 
 def of_units(names):
-    """Parameters of tests: names of units, those of `SELDOM` with their mark."""
+    """Parameters of tests: names of units. Those of `SELDOM` have their mark."""
     return [pytest.param(name, marks=[pytest.mark.seldom] * name.startswith(SELDOM)) for name in names]
 
 
@@ -63,7 +64,7 @@ PIPELINED = [
 SLOW = "specular-" + FURTHER["specular"][0]
 """A unit with an initiation interval of more than 1."""
 
-# The others are proved, in files of their own, to lose nothing and to keep the order.
+# The other units have files of their own, which prove that they lose nothing and keep the order.
 COUNTED = [
     name
     for name in UNITS
@@ -74,14 +75,18 @@ COUNTED = [
 
 @pytest.fixture(autouse=True)
 def short_fifos(monkeypatch):
-    """FIFOs of geometry hold 5 words in place of 512: every bit of theirs is a register of the proof."""
+    """FIFOs of geometry hold 5 words in place of 512, because each of their bits is a register of the
+    proof."""
     monkeypatch.setattr("blysk.hdl.geometry.geometry.WAITING_TRIANGLES", 5)
     monkeypatch.setattr("blysk.hdl.geometry.geometry.BLOCK_WORDS", 5)
     monkeypatch.setattr("blysk.hdl.render.WAITING_SPANS", 5)
 
 
 def of_waiting(unit):
-    """A valid beat stays. A result stands because no beat follows too near: the turn tells how far."""
+    """Claim that a valid beat stays.
+
+    A result that stands is safe because beats keep a distance, which the turn tells.
+    """
     h = Harness(unit)
     stays(h, unit.o)
     if getattr(unit, "stands", False):
@@ -92,15 +97,19 @@ def of_waiting(unit):
     return h
 
 
-# By its whole beat the claim about `SpanHalverUnit` is not decided; it is proved by the unit's registers.
+# For `SpanHalverUnit` the claim about its whole beat is not decided. Another file proves it for the unit's
+# registers.
 @pytest.mark.parametrize("name", of_units(name for name in UNITS if name != "span_halver"))
 def test_beats_that_wait_stay(prove, name):
-    """Inductive: a valid beat stays, with its payload, until it is accepted."""
+    """By induction: a valid beat stays, with its payload, until it is accepted."""
     prove(of_waiting(UNITS[name]()))
 
 
 def of_beats(unit):
-    """A model has a stage for each cycle of the latency; each beat that comes moves on."""
+    """Claims on beats.
+
+    A model has a stage for each cycle of the latency, and each beat moves through the stages.
+    """
     h = Harness(unit)
     m, waits, stages = h.m, Signal(), Signal(unit.latency)
     m.d.sync += waits.eq(unit.o.valid & ~unit.o.ready)
@@ -115,16 +124,17 @@ def of_beats(unit):
 
 @pytest.mark.parametrize("name", of_units(PIPELINED))
 def test_beats_of_a_pipelined_unit(prove, name):
-    """Inductive: each beat that comes leaves ``latency`` cycles after, without those on which it is stalled.
+    """By induction: each beat leaves ``latency`` cycles after it came, not counting cycles in which it is
+    stalled.
 
-    It is stalled only on cycles after one on which a beat was not accepted. So none is lost or invented, and
-    all leave in order. While the output is ready, one is accepted in ``initiation_interval`` cycles.
+    A beat is stalled only in cycles after a beat was not accepted. So no beat is lost or invented, and all
+    leave in order. While the output is ready, a beat is accepted within ``initiation_interval`` cycles.
     """
     prove(of_beats(UNITS[name]()))
 
 
 def of_counts(unit, latency):
-    """Pixels are counted where spans come, of 3 at most."""
+    """Claims on the number of pixels, for units that take spans. Spans have at most 3 pixels."""
     h = Harness(unit)
     length = unit.i.payload.length
     h.assume(length <= 3)
@@ -137,8 +147,10 @@ def of_counts(unit, latency):
 
 @pytest.mark.parametrize("name", COUNTED)
 def test_pixels_of_other_units(prove, name):
-    """In 8 cycles more than the latency: what leaves has come; as long as a pixel is to come and the output
-    is ready, one leaves in as many cycles as the latency."""
+    """In 8 cycles more than the latency: only pixels of spans that came leave, and they leave in time.
+
+    While the output is ready and a pixel is due, one leaves within the latency.
+    """
     unit = UNITS[name]()
     prove(of_counts(unit, unit.latency), unit.latency + 8)
 
@@ -152,13 +164,13 @@ BUGS = {
 @pytest.mark.parametrize("bug", BUGS)
 @pytest.mark.parametrize("name", ["chord", SLOW])
 def test_bugs_of_pipelined_units_are_found(refute, inject, name, bug):
-    """Injected in `PipelinedUnit`, each refutes the claims on the beats of a unit."""
+    """Each bug, injected in `PipelinedUnit`, refutes a claim on the beats of a unit."""
     inject(PipelinedUnit, *BUGS[bug])
     refute(of_beats(UNITS[name]()))
 
 
 def test_bug_of_a_skid_buffer_is_found(refute, inject):
-    """A payload that is dropped while it waits, injected in `skid_buffer`: of a pipelined unit."""
+    """A payload that is dropped while it waits, injected in `skid_buffer`, is found in a pipelined unit."""
     inject(blysk.hdl.core.pipelined_unit, "skid_buffer", "Mux(held, spare, Value.cast(payload))", "payload")
     harness = Harness(unit := DotProductUnit())
     stays(harness, unit.o)
@@ -166,12 +178,12 @@ def test_bug_of_a_skid_buffer_is_found(refute, inject):
 
 
 def test_bug_of_a_result_that_goes_is_found(refute, inject):
-    """A word that the next beat replaces while the result waits."""
+    """A word that the next beat replaces while the result waits is found."""
     inject(GradientSetupUnit, "datapath", "1 + self.stands", "1")
     refute(of_waiting(GradientSetupUnit()), 50)
 
 
 def test_bug_of_a_counter_is_found(refute, inject):
-    """A pixel too many, injected in the recurrence unit's counter."""
+    """A pixel too many, injected in the recurrence unit's counter, is found."""
     inject(RecurrenceUnit, "elaborate", "span.length - 1", "span.length")
     refute(of_counts(RecurrenceUnit(), 3), 16)

@@ -1,4 +1,4 @@
-"""Proofs that no word of a setup or a sum wraps: the bit-accurate models, run on bounds or on every code."""
+"""Proofs that no word of a setup or a sum wraps: bit-accurate models run on bounds, or on every code."""
 
 from functools import partial
 from itertools import product
@@ -76,7 +76,10 @@ UNITS = {
     **{f"chord_setup-{bits}": partial(ChordSetupUnit, ChordSetup(bits)) for bits in range(36, 47, 2)},
     "line_setup": LineSetupUnit,
 }
-"""Units wrap in no other formats than their models, to which they are equal to the bit (`tests/hdl`)."""
+"""Units of which it is checked that they wrap only in formats in which their models wrap.
+
+Tests of `tests/hdl` show that both are equal to the bit.
+"""
 
 
 WHOLE = {
@@ -87,38 +90,39 @@ WHOLE = {
     **{f"chord_setup-{bits}": partial(of_chord_setup, bits) for bits in range(36, 47, 2)},
     "line_setup": of_line_setup,
 }
-"""Any codes of the operands."""
+"""Runs of models on any codes of their operands."""
 
 
 @pytest.mark.parametrize("name", WHOLE)
 def test_no_word_wraps_whatever_the_operands(wraps, name):
-    """By bounds: any code of every operand, whatever angle and lengths vectors have; 1 to 4095 pixels."""
+    """By bounds: no word wraps for any code of every operand, so for vectors of any angle and length; 1 to
+    4095 pixels."""
     WHOLE[name]()
     assert name not in UNITS or wrapped_by(UNITS[name]()) <= set(wraps)
 
 
 @pytest.mark.parametrize("model", [*product((1, 2), (45, 90), (False, True))])
 def test_no_word_of_a_bisection_wraps(wraps, model):
-    """Every word of u up to the flag, and those under 0 that lengths over 1 give."""
+    """Every word of u up to the flag is tried, and words under 0, which vectors longer than 1 give."""
     of_bisection(*model)
     assert wrapped_by(BisectionUnit(Bisection(*model))) <= set(wraps)
 
 
 @pytest.mark.parametrize("model", [*product((1, 2), (45, 90), (False, True))])
 def test_no_word_of_a_chain_of_bisections_wraps(wraps, model):
-    """Every word of u up to the flag, and what each of 15 levels makes of it; u and the weights saturate."""
+    """Every word of u up to the flag is tried, through 15 levels. u and the weights saturate."""
     of_bisection_chain(*model)
     assert wrapped_by(BisectionChainUnit(BisectionChain(Bisection(*model)))) <= set(wraps)
 
 
 def test_no_word_of_a_renormaliser_wraps(wraps):
-    """Every squared length that is served, to the bits that are read."""
+    """Every squared length that the unit serves is tried, to the bits that it reads."""
     of_renormaliser()
     assert wrapped_by(RenormaliserUnit()) <= set(wraps)
 
 
 def test_no_word_of_a_half_chord_wraps(wraps):
-    """Every address and fraction of the table, every word of z, to a squared chord of 2."""
+    """Every address and fraction of the table, and every word of z, is tried, up to a squared chord of 2."""
     of_half_chord()
     assert wrapped_by(HalfChordUnit()) <= set(wraps)
 
@@ -127,13 +131,13 @@ def test_no_word_of_a_half_chord_wraps(wraps):
     "model", [m for m in SPECULAR_MODELS + FURTHER_MODELS if Specular(REFLECTION_MODELS[m]).slope_terms]
 )
 def test_slopes_of_the_specular_unit_do_not_wrap(wraps, model):
-    """Every exponent; other models read a table."""
+    """Every exponent is tried. Other models read a table."""
     of_specular_slopes(Specular(REFLECTION_MODELS[model]))
     assert wraps == [Specular.SLOPE_FORMAT]
 
 
 def test_shifts_of_the_recurrence_setup_do_not_wrap():
-    """None is less than 0, and all fit their registers."""
+    """No shift is less than 0, and all fit their registers."""
     of_recurrence_shifts()
     widths = {register.name: len(register) for register in registers_of(RecurrenceSetupUnit())}
     assert {widths[f"{name}_shift"] for name in ("step", "phase")} == {6}
@@ -143,7 +147,7 @@ def test_shifts_of_the_recurrence_setup_do_not_wrap():
 
 @pytest.mark.parametrize("bits", [(5, 4), (6, 3)])
 def test_shifts_of_the_recurrence_a_bit_too_short_are_found(bits):
-    """A bit less."""
+    """Registers with a bit fewer are found."""
     with pytest.raises(AssertionError, match=" wraps in "):
         of_recurrence_shifts(*bits)
 
@@ -165,11 +169,17 @@ CUTS = {
     "blysk.hdl.cosines.recurrence_setup.RecurrenceSetupUnit._normalised": "q; the model refuses",
     "blysk.hdl.cosines.recurrence_setup.RecurrenceSetupUnit._under_one": "under 1, times 2",
 }
-"""Where hardware cuts bits of a sum, a shift or a choice, and why what it cuts is 0, or not wanted."""
+"""Functions in which hardware cuts bits of a sum, a shift or a choice.
+
+The reason tells why the cut bits are 0, or are not wanted.
+"""
 
 
 def test_sums_are_cut_in_these_places_alone():
-    """Of units above, with those of their interpolators; `test_angular_setup` has the other."""
+    """The units above, and those of their interpolators, cut only in these functions.
+
+    `test_angular_setup` has the other units.
+    """
     units = (
         *(make() for make in UNITS.values()),
         *(make() for make in (BisectionUnit, BisectionChainUnit, RenormaliserUnit, HalfChordUnit)),
@@ -182,7 +192,7 @@ def test_sums_are_cut_in_these_places_alone():
 
 
 def test_a_sum_that_is_cut_is_found(inject):
-    """A slice, injected in place of the format that a word has."""
+    """A slice, injected in place of the format of a word, is found."""
     inject(
         *(DifferenceAccumulatorUnit, "elaborate", "value.eq((value + difference).wrap(p.format))"),
         "value.as_value().eq((value + difference).as_value()[: p.format.width])",
@@ -192,20 +202,25 @@ def test_a_sum_that_is_cut_is_found(inject):
 
 @pytest.mark.seldom
 def test_slopes_of_the_recurrence_setup_do_not_wrap(monkeypatch, wraps):
-    """By bounds, for every word of q; and the first difference of spans of two pixels."""
+    """By bounds: no word wraps for every word of q, and neither does the first difference of spans of two
+    pixels."""
     of_recurrence_slopes(monkeypatch)
     assert wrapped_by(RecurrenceSetupUnit()) <= set(wraps)
 
 
 @pytest.mark.seldom
 def test_first_steps_of_the_recurrence_do_not_wrap():
-    """By bounds, for every word of K to 90 degrees: the first difference, and x and D of the seven steps."""
+    """By bounds, for every word of K up to 90 degrees: the first difference, and x and D of the seven steps,
+    fit."""
     of_recurrence_prologue()
 
 
 @pytest.mark.parametrize("model", [{}, {"guard_bits": 20}, {"interleave": 4}])
 def test_words_of_the_recurrence_wrap_in_the_format_of_its_state(model):
-    """Of which it is proved that it holds them, in `test_recurrence`; a direct recurrence saturates."""
+    """The recurrence wraps only in the format of its state.
+
+    `test_recurrence` proves that this format holds x and D. A direct recurrence saturates.
+    """
     model = Recurrence(**model)
     assert wrapped_by(RecurrenceUnit(model)) == {model.state_format}
 
@@ -213,20 +228,20 @@ def test_words_of_the_recurrence_wrap_in_the_format_of_its_state(model):
 @pytest.mark.seldom
 @pytest.mark.parametrize(("as_published", "fits"), [(False, MIDDLE_NORMAL_FITS), (True, ("exact",))])
 def test_sums_of_normals_do_not_wrap(as_published, fits):
-    """By bounds, for spans to 45 degrees: at every pixel of each length from 1 to 4095."""
+    """By bounds, for spans up to 45 degrees: sums fit at every pixel of each length from 1 to 4095."""
     of_normals(as_published, fits)
 
 
 @pytest.mark.seldom
 def test_sums_of_straight_lines_do_not_wrap(wraps):
-    """The same, for any two ends of which no component of the difference is over 1."""
+    """By bounds: the same for any two ends whose difference has no component over 1."""
     of_lines()
     assert wrapped_by(DifferenceAccumulatorUnit()) <= set(wraps)
 
 
 @pytest.mark.seldom
 def test_sums_of_lines_before_they_are_renormalised_do_not_wrap(wraps):
-    """The same, for any two ends of any length."""
+    """By bounds: the same for any two ends of any length."""
     of_true_lines()
     assert wrapped_by(LineAccumulatorUnit(RenormaliseInterpolator())) <= set(wraps)
 
@@ -234,7 +249,7 @@ def test_sums_of_lines_before_they_are_renormalised_do_not_wrap(wraps):
 @pytest.mark.seldom
 @pytest.mark.parametrize("levels", range(AdaptiveNormaliser(2.0**-14).depth + 1))
 def test_sums_of_segments_do_not_wrap(wraps, levels):
-    """The same, for any two ends of a segment, and as many segments as there can be."""
+    """By bounds: the same for any two ends of a segment, and the largest number of segments."""
     of_segments(levels)
     formats = wrapped_by(AdaptiveNormaliserUnit()) - wrapped_by(BisectionUnit())
     assert AdaptiveNormaliser.ACCUMULATOR_FORMAT in formats <= set(wraps)
@@ -242,13 +257,14 @@ def test_sums_of_segments_do_not_wrap(wraps, levels):
 
 @pytest.mark.parametrize(("name", "bits"), [("diffuse", 46), ("highlight", 36), ("highlight", 46)])
 def test_sums_of_chords_do_not_wrap(wraps, name, bits):
-    """The same, for any values, P and G; so differences of a pixel to the next."""
+    """By bounds: the same for any values, P and G, and for the differences from pixel to pixel."""
     of_chord_sums(name, bits)
     assert wrapped_by(ChordAccumulatorUnit(LocalChordInterpolator(fraction_bits=bits), 1)) <= set(wraps)
 
 
 def test_bounds_hold():
-    """What models give for random codes is within what they give for bounds, and not far within."""
+    """Results of models for random codes are within their results for bounds, and near the ends of the
+    bounds."""
     rng, unit = np.random.default_rng(1), ChordSetup()
     lengths = np.repeat(rng.integers(1, 4096, 100), 1000)
     words = [Fixed(f, rng.integers(f.min_code, f.max_code + 1, (len(lengths), 1))) for f in FORMATS]
@@ -281,7 +297,7 @@ SHORTER_FORMATS = {
     "high word of the slope of chords": (WHOLE["chord_setup-46"], ChordSetup, "HIGH_FORMAT", SQ(-1, 18)),
     "differences of lines": (WHOLE["line_setup"], LineSetup, "FORMAT", SQ(1, 40)),
     "high word of a line": (WHOLE["line_setup"], LineSetup, "HIGH_FORMAT", SQ(1, 15)),
-    # It stays between the ends of the segment, so that of its two integer bits one is to spare.
+    # The result lies between the ends of the segment, so one of its two integer bits is spare.
     "sum of a segment": (partial(of_segments, 2), AdaptiveNormaliser, "ACCUMULATOR_FORMAT", SQ(0, 32)),
     "step of a segment": (partial(of_segments, 2), AdaptiveNormaliser, "STEP_FORMAT", SQ(0, 32)),
     "slope": (partial(of_specular_slopes, Specular()), Specular, "SLOPE_FORMAT", UQ(8, 18)),
@@ -290,7 +306,7 @@ SHORTER_FORMATS = {
 
 @pytest.mark.parametrize("word", SHORTER_FORMATS)
 def test_formats_a_bit_too_short_are_found(monkeypatch, word):
-    """An integer bit less than what is needed, injected in the parameters."""
+    """One integer bit fewer than needed, injected in the parameters, is found."""
     prove, *change = SHORTER_FORMATS[word]
     monkeypatch.setattr(*change)
     with pytest.raises(AssertionError, match=" wraps in "):
@@ -298,7 +314,7 @@ def test_formats_a_bit_too_short_are_found(monkeypatch, word):
 
 
 def test_slope_of_the_recurrence_a_bit_too_short_is_found(monkeypatch):
-    """The same."""
+    """The same is found for other sums."""
     monkeypatch.setattr(RecurrenceSetup, "SLOPE_FORMAT", SQ(1, 28))
     with pytest.raises(AssertionError, match=" wraps in "):
         of_recurrence_slopes(monkeypatch)
@@ -331,7 +347,7 @@ SHORTER_WORDS = {
         partial(of_bisection_chain, 2, 90, False),
         *(Bisection, "factor", "wrap(self.FACTOR_FORMAT)", "wrap(SQ(-2, 19))"),
     ),
-    # It stays under 1, so that its integer bit is to spare.
+    # The word stays under 1, so its integer bit is spare.
     "slope of the renormaliser": (
         of_renormaliser,
         *(Renormaliser, "factor", "wrap(self.C1_FORMAT)", "wrap(UQ(-1, 16))"),
@@ -349,7 +365,7 @@ SHORTER_WORDS = {
 
 @pytest.mark.parametrize("word", SHORTER_WORDS)
 def test_words_a_bit_too_short_are_found(inject, word):
-    """An integer bit less, injected in the model."""
+    """One integer bit fewer, injected in the model, is found."""
     prove, *change = SHORTER_WORDS[word]
     inject(*change)
     with pytest.raises(AssertionError, match=" wraps in "):
@@ -357,7 +373,7 @@ def test_words_a_bit_too_short_are_found(inject, word):
 
 
 def test_angles_beyond_the_proof_are_found(inject):
-    """A level that takes too much off u, injected in the chain."""
+    """A level that takes too much off u, injected in the chain, is found."""
     inject(BisectionChain, "compute", "u.scale(-1) - e - ", "u.scale(-1) - e - e - e - ")
     with pytest.raises(AssertionError, match="no angle of a bisection"):
         of_bisection_chain(2, 45, False)
@@ -375,6 +391,9 @@ SHORTER_SUMS = {
 
 @pytest.mark.parametrize("word", SHORTER_SUMS)
 def test_sums_a_bit_too_short_are_found(word):
-    """The same; of N.L two bits less, as its sum has the format of that of u."""
+    """One integer bit fewer is found.
+
+    For N.L it takes two bits, because its sum has the format of the sum of u.
+    """
     with pytest.raises(AssertionError, match=" wraps in "):
         SHORTER_SUMS[word]()

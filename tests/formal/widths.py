@@ -1,4 +1,4 @@
-"""Runs of bit-accurate models on bounds or on every code, for the proofs that no word wraps."""
+"""Runs of bit-accurate models on bounds, or on every code, for proofs that no word wraps."""
 
 from dataclasses import replace
 
@@ -48,7 +48,7 @@ def of_quadratic_evaluator(form):
 
 
 def of_chord_setup(fraction_bits):
-    """Any three values, whether they fit or not: P and G saturate."""
+    """Any three values. P and G saturate if they do not fit."""
     unit = ChordSetup(fraction_bits)
     unit.compute(word(unit.DIFFUSE_FORMAT, 1, 1, 3), word(unit.HIGHLIGHT_FORMAT, 1, 1, 3), LENGTHS)
 
@@ -58,18 +58,18 @@ def of_line_setup():
 
 
 def parts_of_lengths():
-    """All lengths, by some 100,000 pixels, and the pixels: their spans and places."""
+    """All lengths in parts of about 100,000 pixels, each with the spans and positions of its pixels."""
     for lengths in np.array_split(LENGTHS, np.searchsorted(np.cumsum(LENGTHS), np.arange(1, 84) * 100_000)):
         yield lengths, *pixels_of(lengths)
 
 
 def rows(bounds, lengths):
-    """A row for every length."""
+    """The bounds with a row for every length."""
     return bounds + np.zeros((len(lengths), 1))
 
 
 def walk(unit, start, first, second, span, step):
-    """Sums of every pixel; and the differences, of all but the last."""
+    """Check the sums of every pixel, and the differences of every pixel but the last."""
     unit.compute(start, first, second, span, step)
     before = np.flatnonzero(np.diff(span, append=-1) == 0)
     changes = first.codes[span[before]] + step[before, np.newaxis] * second.codes[span[before]]
@@ -78,10 +78,11 @@ def walk(unit, start, first, second, span, step):
 
 
 def of_normals(as_published, fits, format=DifferenceSetup.FORMAT):
-    """Spans to 45 degrees, as of the middle normal's flag.
+    """Spans up to 45 degrees, where the middle normal has its flag.
 
-    By vectors of exactly unit length ``|N_r - N_l| = 2 sin(psi/2)``, ``|G| = 4 (1 - cos(psi/2))``, one across
-    the other, and P is their difference; lengths are off, N_c is, and the flag is a little beyond.
+    For vectors of exactly unit length ``|N_r - N_l| = 2 sin(psi/2)`` and ``|G| = 4 (1 - cos(psi/2))``. Both
+    are perpendicular, and P is their difference. ``error`` is for lengths that are off, for the error of N_c,
+    and for angles a little beyond 45 degrees.
     """
     half = np.radians(MAX_SPAN_ANGLE) / 2
     error = 2.0**-12 + 4 * max(MiddleNormal(fit).error for fit in fits)
@@ -100,7 +101,7 @@ def of_normals(as_published, fits, format=DifferenceSetup.FORMAT):
 
 
 def of_lines(format=DifferenceSetup.FORMAT):
-    """Straight lines: any ends."""
+    """Straight lines between any ends."""
     left, right = (unknown(COMPONENT.min_code, COMPONENT.max_code) for _ in range(2))
     p = (right - left).known(GPQ.P_FORMAT.min_code, GPQ.P_FORMAT.max_code)
     for lengths, span, step in parts_of_lengths():
@@ -112,7 +113,7 @@ def of_lines(format=DifferenceSetup.FORMAT):
 
 
 def of_true_lines(format=None):
-    """Lines before they are renormalised: any ends."""
+    """Lines between any ends, before they are renormalised."""
     sums, ends = RenormaliseInterpolator().accumulator, RenormaliseInterpolator.END_FORMAT
     if format is not None:
         sums = replace(sums, format=format)
@@ -125,7 +126,7 @@ def of_true_lines(format=None):
 
 
 def of_segments(levels):
-    """Any two ends; of those further apart than the word of a difference, left is on the other side of 0."""
+    """Any two ends. If a component differs by more than its word holds, left is on the other side of 0."""
     unit = AdaptiveNormaliser()
     low, high = COMPONENT.min_code, COMPONENT.max_code
     left, right = (unknown(low, high) for _ in range(2))
@@ -143,7 +144,7 @@ def of_segments(levels):
 
 
 def of_chord_sums(name, fraction_bits, format=None):
-    """Any values at the first pixel, any P and G."""
+    """Any values at the first pixel, and any P and G."""
     unit = LocalChordInterpolator(fraction_bits=fraction_bits)
     sums, setup = unit.accumulators[name], unit.setup
     if format is not None:
@@ -167,13 +168,13 @@ def of_bisection(degree, max_angle, as_published):
 
 
 def of_bisection_chain(degree, max_angle, as_published):
-    """Every word of u up to the flag, through all levels: u alone decides the factors of each.
+    """Every word of u up to the flag, through all levels. The factors of a level depend only on u.
 
-    Angles that a level gives to the bisection's factor are those of `of_bisection`.
+    `of_bisection` covers the angles for which a level asks the factor of the bisection.
     """
     unit = BisectionChain(Bisection(degree, max_angle, as_published))
     p, factor, levels = unit.bisection, unit.bisection.factor, (1 << unit.LEVEL_BITS) - 1
-    # Of eight words one angle; from -2, as lengths may be over 1.
+    # Eight words of u have the same angle. The range begins at -2, because lengths may be over 1.
     u = np.arange(-2, p.widest.codes + 0.5, 1 / 8)
     u = Fixed.round(unit.WEIGHT_FORMAT, u * p.ANGLE_FORMAT.step)
     dot = Fixed(DotProduct().result_format, ONE_SQUARED.codes - (u.codes << 14))
@@ -194,7 +195,7 @@ def of_bisection_chain(degree, max_angle, as_published):
 
 
 def of_renormaliser():
-    """Every segment and x of the four octaves of s."""
+    """Every segment and every x in the four octaves of s."""
     unit, width = Renormaliser(), Renormaliser.SEGMENT_BITS + Renormaliser.OFFSET_FORMAT.width
     square = DotProduct().result_format
     codes = (1 << square.fraction_bits - 2) + (np.arange(1 << width) << square.fraction_bits - 2 - width)
@@ -213,7 +214,7 @@ def of_specular_slopes(model):
 
 
 def sectors(degrees, one, like):
-    """A and x of ``a^2 + x^2 <= 1``, for each sector between two radii: the box about it.
+    """A and x with ``a^2 + x^2 <= 1``: for each sector between two radii, the box around the sector.
 
     No sector has an axis inside.
     """
@@ -224,11 +225,12 @@ def sectors(degrees, one, like):
 
 
 def of_recurrence_slopes(monkeypatch):
-    """Every word of q from 1/8 on, and of each shift after that the largest: others are within.
+    """Every word of q from 1/8 on, and the largest word of each further shift; all other words lie between
+    them.
 
-    With T a unit vector across N_l, ``N_r = (1 - q) N_l + sin(psi) T``, so ``b = (1 - q) a + sin(psi) x``,
-    x = T.H. Of q the word is off by half a step, and by what `Chord` cuts; b by more than twice what lengths
-    of codes are. The span has two pixels.
+    Let T be the unit vector perpendicular to N_l, and x = T.H. Then ``N_r = (1 - q) N_l + sin(psi) T``, so
+    ``b = (1 - q) a + sin(psi) x``. ``cut`` is for the errors: q is off by half a step and by the cuts of
+    `Chord`. b has more than twice the error of the codes' lengths. The span has two pixels.
     """
     unit = RecurrenceSetup()
     word = np.r_[np.tile(np.arange(1 << 16, 1 << 17), 3), np.full(32, (1 << 17) - 1)]
@@ -247,18 +249,20 @@ def of_recurrence_slopes(monkeypatch):
 
 
 def of_recurrence_prologue(format=None):
-    """Every word of K, for steps to 90 degrees; K and D(0) may be off by 1 %, the setup's are by under 0.1 %.
+    """Every word of K, for steps up to 90 degrees.
 
-    ``D(0) = x sin d - a K/2`` with x as in the slopes, ``a^2 + x^2 <= 1``: in sectors of 15 degrees. Where
-    K is under 2^-7, D(0) may be off by 0.1: so it may be anything that ends a few codes apart give, whose
-    lengths are off by as much as they differ.
+    K and D(0) may be off by 1 %; the setup's are off by under 0.1 %.
+
+    ``D(0) = x sin d - a K/2`` with x as for the slopes and ``a^2 + x^2 <= 1``, in sectors of 15 degrees. If K
+    is under 2^-7, D(0) may be off by 0.1. This covers ends that are a few codes apart, whose lengths are off
+    by as much as the ends differ.
     """
     unit = RecurrenceSetup().steps
     state = format or unit.state_format
     shift, low = (axis.ravel() for axis in np.indices((9, 1 << 12)))
     low = (low << 4) + (1 << 16)
     near = low * 2.0 ** (-15 - shift) <= 2.02
-    # The last box stands for all K under 2^-7.
+    # The last box covers all K under 2^-7.
     shift, low, high = (
         np.append(x[near], last) for x, last in ((shift, 9), (low, 0), (low + 15, (1 << 17) - 1))
     )
@@ -277,7 +281,7 @@ def of_recurrence_prologue(format=None):
 
 
 def of_recurrence_shifts(bits=6, bits_of_length=4):
-    """Places by which words are shifted: 65 words of q of the ends of its shifts, and 0; every length."""
+    """Shifts of words, for 65 words of q at the ends of its shifts, for q = 0, and for every length."""
     words = np.r_[0, np.arange(1 << 16, 1 << 17, 1 << 10), (1 << 17) - 1]
     word, shift, length = (axis.ravel() for axis in np.meshgrid(words, np.r_[0, 1, 2, 34], LENGTHS))
     shifts, decided = [], []
