@@ -1,18 +1,19 @@
-// Runs a stream through a CXXRTL model, in compiled code. `sim/engines/cxxrtl.py` puts the model's file name
-// (BLYSK_MODEL), its key (BLYSK_KEY) and the optional members (BLYSK_HAS_...) in front of this text.
+// This driver runs a stream through a CXXRTL model. `sim/engines/cxxrtl.py` puts macros in front of this text: the file
+// name of the model (BLYSK_MODEL), its key (BLYSK_KEY), and the optional members (BLYSK_HAS_...).
 //
-// One evaluation a clock is enough and exact. `eval()` computes every combinational output from the inputs and
-// from the registers as they are, and puts what the registers become aside; `commit()` takes that over. Between the
-// two, the outputs are therefore those just before the rising edge with this clock's inputs applied, including
-// a `ready` that depends on the other side's `ready`; read there, nothing is stale. This needs a model
-// whose `eval()` comes to rest in one pass: Yosys warns where it does not, and the builder refuses such a design.
+// One evaluation a clock is enough and exact. `eval()` computes every combinational output from the inputs and from the
+// present values of the registers. It stores the next values of the registers, and `commit()` makes them the present
+// values. The driver reads the outputs after `eval()` and before `commit()`. So the outputs are those just before the
+// rising edge, for the inputs of this clock. This holds for a `ready` that depends on the other side's `ready`, too.
+// All this needs a model whose values settle in one `eval()`. For other designs Yosys warns, and the builder refuses
+// them.
 //
-// The model lives on the heap: g++ 12 -O2 miscompiles it as a local object.
+// The model is on the heap, because g++ 12 -O2 compiles a local model wrongly.
 
 #ifndef BLYSK_WORDS
 #include <cxxrtl/cxxrtl.h>
 #else
-// All of it that a model of words needs, without the headers that take a compiler half a second.
+// The part of CXXRTL that a model of words needs. CXXRTL's own headers would take half a second to compile.
 #include <cstddef>
 #include <cstdint>
 #include <cstring>
@@ -39,9 +40,10 @@ struct module {
 } // namespace cxxrtl
 #endif
 
-// CXXRTL's own values are arrays of 32-bit chunks, which compilers are slow at and make slow code of. These are machine
-// words; one is enough for most of a datapath, and makes the shading pipeline 2.5 times as fast. They offer what generated
-// code uses; operations that are rare, or wide, are CXXRTL's.
+// CXXRTL's own values are arrays of 32-bit chunks. They compile slowly, and the compiled code is slow. The values of
+// this namespace are arrays of machine words. Most values of a datapath are one word. The shading pipeline is 2.5 times
+// as fast with them. They have the operations that generated code uses. Rare operations, and operations on wide values,
+// are CXXRTL's.
 namespace native {
 
 using cxxrtl::interior;
@@ -56,7 +58,7 @@ constexpr word ones(size_t count) { return count < 64 ? (word(1) << count) - 1 :
 template<size_t Bits> struct value;
 template<size_t Bits, size_t Stop, size_t Start> struct slice_of;
 
-// The most significant part and the least; references to what may be assigned to.
+// Two parts of a value, the most significant part first. A part that may be assigned to is a reference.
 template<class High, class Low> struct concat_of;
 
 template<class Self>
@@ -94,7 +96,7 @@ struct value : expression<value<Bits>> {
 
 	value() = default;
 
-	// From the chunks of 32 bits in generated code, the lowest first.
+	// A value from the chunks of 32 bits in generated code, the lowest chunk first.
 	template<typename... Init>
 	explicit constexpr value(uint32_t first, Init... init) {
 		const uint32_t chunks[] = {first, uint32_t(init)...};
@@ -234,7 +236,7 @@ struct wire {
 	wire(const wire &) = delete;
 	wire &operator=(wire &&) = default;
 
-	// Whether anything has changed is of interest only where one evaluation is not enough.
+	// The result tells whether a value changed. It matters only if a clock needs several evaluations, so it is false.
 	template<class Observer>
 	CXXRTL_ALWAYS_INLINE bool commit(Observer &) {
 		curr = next;
@@ -258,7 +260,7 @@ struct memory {
 
 	const value<Width> &operator[](size_t index) const { return data[index]; }
 
-	// Of a memory that nobody reads any more before the next clock.
+	// Writes at once. Nothing reads the memory after this write and before the next clock.
 	CXXRTL_ALWAYS_INLINE void write(size_t index, const value<Width> &from) { data[index] = from; }
 
 	CXXRTL_ALWAYS_INLINE void write(size_t index, const value<Width> &from, const value<Width> &mask) {
@@ -267,7 +269,7 @@ struct memory {
 			target.data[n] = (target.data[n] & ~mask.data[n]) | (from.data[n] & mask.data[n]);
 	}
 
-	// The writes of a clock take place at its edge, those of higher priority later.
+	// The writes of a clock happen at its edge. Writes of higher priority happen later.
 	CXXRTL_ALWAYS_INLINE void update(size_t index, const value<Width> &from, const value<Width> &mask, int priority) {
 		if (mask) {
 			auto place = writes.end();
@@ -299,7 +301,7 @@ struct memory_index {
 		valid((offset == 0 && Bits < 64 && depth >> Bits) || address.data[0] - offset < depth), index(address.data[0] - offset) {}
 };
 
-// What `words.py` writes shifts and counts with.
+// Functions for the shifts and counts in the code that `words.py` writes.
 CXXRTL_ALWAYS_INLINE word shifted_left(word a, word b) { return b < 64 ? a << b : 0; }
 CXXRTL_ALWAYS_INLINE word shifted_right(word a, word b) { return b < 64 ? a >> b : 0; }
 CXXRTL_ALWAYS_INLINE word shifted_signed(word a, word b) { return int64_t(a) >> (b < 63 ? b : 63); }
@@ -391,7 +393,7 @@ LIBRARY(modfloor)
 #include BLYSK_MODEL
 
 #ifdef BLYSK_FREESTANDING
-// For a build without a C++ runtime library.
+// Functions that a build without a C++ runtime library lacks.
 #include <cstdlib>
 void *operator new(std::size_t size) {
 	if (void *memory = std::malloc(size ? size : 1)) return memory;
@@ -415,7 +417,7 @@ const native::value<Bits> &current(const native::wire<Bits> &port) { return port
 template<class Port>
 bool high(const Port &port) { return current(port).data[0]; }
 
-// 32-bit words of a port, which the payloads of a stream are packed into.
+// Number of 32-bit words into which the payload of a port is packed.
 template<class Port>
 constexpr size_t count(const Port &) { return (Port::bits + 31) / 32; }
 
@@ -431,7 +433,7 @@ bool equal(const uint32_t *to, const Port &port) { return !memcmp(to, current(po
 template<size_t Bits>
 void fill(native::value<Bits> &port) { port = native::value<Bits>{}.bit_not(); }
 
-// The numbers of `engine.End`.
+// The numbers of `engine.StopReason`.
 enum End : int32_t { LIMIT, DONE, DROPPED, CHANGED, EXTRA, STUCK };
 
 using Model = cxxrtl_design::p_top;
@@ -444,17 +446,17 @@ struct Simulation {
 
 } // namespace
 
-// The same members in `cxxrtl._Job`.
+// `cxxrtl._Job` has the same members.
 struct Job {
 	const uint32_t *constants, *write, *input;
 	const uint8_t *input_stalls, *output_stalls;
-	const int64_t *write_after; // Beats taken before each write; null: none.
+	const int64_t *write_after; // Number of input beats taken before each write. Null stands for 0.
 	int64_t write_count, input_count, input_period, output_period;
-	int64_t count; // -1: as many as come
+	int64_t count; // Expected number of output beats. -1 stands for any number.
 	int64_t idle_timeout, settle;
-	// Where the run stands.
+	// State of the run.
 	int64_t clock, last, written, taken, given;
-	// `output` and `cycles` hold one batch, `input_cycles` the whole run.
+	// `output` and `cycles` hold one batch. `input_cycles` holds the whole run.
 	uint32_t *output;
 	int64_t *cycles, *input_cycles;
 	uint32_t *status;
@@ -568,7 +570,7 @@ int32_t blysk_run(void *handle, Job *job, int64_t cycles) {
 			offered = false;
 			moved = true;
 			model.p_i____valid.set(false);
-			// The next beat, if there is one to offer, goes over it.
+			// If there is a next beat to offer, it replaces these 1 bits.
 			fill(model.p_i____payload);
 		}
 		if (moved) last = clock;
@@ -576,7 +578,8 @@ int32_t blysk_run(void *handle, Job *job, int64_t cycles) {
 
 #ifdef BLYSK_HAS_STATUS
 	if (end == DONE || end == LIMIT) {
-		// Without an edge: combinational outputs only. `parts.py` has the status put together only here.
+		// This evaluation has no clock edge, so it computes combinational outputs only. In a model
+		// that `parts.py` has rewritten, only an evaluation without an edge computes the status.
 		model.prev_p_clk.set(true);
 		model.eval();
 		store(job->status, model.p_status);

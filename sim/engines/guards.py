@@ -235,9 +235,9 @@ def group_registers(text: str) -> str:
     made only where it is written. A memory with one write port is written in place, too, after all statements
     that read it. The rewritten model behaves the same, for four reasons:
 
-    - The statements at the edge read old register values, and combinational values that are complete before
-      the first of them. So their order is free, and a register that no later statement reads may take its
-      next value.
+    - The statements at the edge read old register values and combinational values. The combinational values
+      are complete before the first statement at the edge. So the order of these statements is free, and a
+      register that no later statement reads may take its next value.
     - Before every evaluation, ``next`` of a copied register equals its ``curr``. So the statement ``r.next =
       r.curr`` may be left out.
     - The driver reads outputs before the copies. So registers that are outputs are copied.

@@ -2,8 +2,8 @@
 
 Amaranth joins the fields of a structure to a word. It passes the word on from unit to unit under new names,
 and splits it where a field is used. This happens on every clock, even for frame constants of 271 bits.
-`read_parts` follows each field to its source, a word or register, and removes the words that are no longer
-read. The status, which the driver reads in an evaluation without a clock edge, is computed only there.
+`read_parts` follows each field to its source (a word or a register). It removes the words that are no longer
+read. The driver reads the status in an evaluation without a clock edge. Only this evaluation computes it.
 """
 
 import re

@@ -1,5 +1,5 @@
-// The driver as a WebAssembly module without imports: behind the text of `cxxrtl_driver.cc`. Memory is given out from
-// one end and taken back at once, `new` included: what a run needs goes when it ends.
+// This text follows `cxxrtl_driver.cc`. Both texts together make a WebAssembly module without imports. Memory is given
+// out from its lower end upwards, also by `new`. When a run ends, all memory given out during the run is taken back.
 
 #define EXPORT(name) extern "C" __attribute__((export_name(#name)))
 
@@ -32,16 +32,16 @@ void operator delete[](void *, size_t) noexcept {}
 extern "C" void abort() { __builtin_trap(); }
 extern "C" void __cxa_pure_virtual() { __builtin_trap(); }
 
-// Memory for the arrays of a run, until `release`.
+// Memory for the arrays of a run. `release` takes all memory back.
 EXPORT(reserve) void *reserve(uint32_t size) { return give(size); }
 EXPORT(release) void release() { top = 0; }
 
-// What is known after a run: cycles up to and with the last transfer, pixels given, and words of the status.
+// Results of a run: number of cycles up to and including the last transfer, number of pixels, and words of the status.
 EXPORT(cycles) int32_t cycles() { return job.last + 1; }
 EXPORT(given) int32_t given() { return job.given; }
 EXPORT(status) const uint32_t *status() { return status_words; }
 
-// Sets the run that follows: arrays as those of `Job`, every one reserved before; starts at power-up.
+// Prepares the next run, which starts at power-up. The arrays are members of `Job`, in memory from `reserve`.
 EXPORT(prepare) void prepare(const uint32_t *write, int32_t writes, const uint32_t *input, int32_t inputs, uint32_t *output,
 		int32_t count, int64_t *cycles, int64_t *input_cycles) {
 	job = Job{};
@@ -61,7 +61,7 @@ EXPORT(prepare) void prepare(const uint32_t *write, int32_t writes, const uint32
 	job.status = status_words;
 }
 
-// Runs to the end; its `End`.
+// Runs to the end, and returns the `End`.
 EXPORT(run) int32_t run() {
 	const uintptr_t before = top;
 	const int32_t end = blysk_run(blysk_open(), &job, int64_t(1) << 40);
@@ -69,8 +69,8 @@ EXPORT(run) int32_t run() {
 	return end;
 }
 
-// The same a clock at a time, with the status after each in `rows`: words as they stand on the next clock. As many
-// cycles as `limit`, or to the end. The number of rows; `End` is in `ended`.
+// Runs at most `limit` clocks, one after the other. After each clock a row of `rows` gets the status, as it is on the
+// next clock. Returns the number of rows. `ended` gets the `End`.
 EXPORT(trace) int32_t trace(uint32_t *rows, int32_t limit, int32_t *ended) {
 	const uintptr_t before = top;
 	Simulation *simulation = static_cast<Simulation *>(blysk_open());

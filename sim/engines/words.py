@@ -1,8 +1,8 @@
 """CXXRTL's C++ with expressions of at most 64 bits rewritten to expressions of one machine word.
 
 CXXRTL writes every expression with templates over the widths: ``add_uu<5>(a.curr, b.slice<7,4>().val())``.
-A compiler takes longer to instantiate and inline them than for all the rest. `plain_words` writes such an
-expression as ``((a.curr.data[0] + ((b.data[0] >> 4) & 0xf)) & 0x1f)``. The model behaves the same, and
+A compiler takes longer to instantiate and inline these templates than for all the rest. `plain_words` writes
+this expression as ``((a.curr.data[0] + ((b.data[0] >> 4) & 0xf)) & 0x1f)``. The model behaves the same, and
 compiles in two fifths of the time.
 """
 

@@ -78,8 +78,8 @@ def assembled(
     """All triangles of a scene in world coordinates, as one mesh.
 
     If the scene is ``painted``, a part's metadata have the number of its ``"material"``. They may have
-    ``"colors"``, a float64 array of shape (V, 3), linear, or (V, 4) with alpha. They may have
-    ``"coordinates"``, a float64 array of shape (V, 2), with v from the top of the image.
+    ``"colors"`` in linear light: a float64 array of shape (V, 3), or of shape (V, 4) with alpha. They may
+    have ``"coordinates"``: a float64 array of shape (V, 2), with v from the top of the image.
     """
     import trimesh
 
@@ -209,8 +209,8 @@ def _placed(scene: "trimesh.Scene") -> list[tuple[np.ndarray, str]]:
 def _with_materials(loaded: LoadedMesh, found: Found) -> LoadedMesh:
     """The mesh with the materials that its faces use, numbered from 0. Equal materials are merged.
 
-    The faces of ``loaded`` have four times the number of their material in the file, plus 2 if their vertices
-    have colours, plus 1 if the vertices have texture coordinates.
+    The material of a face of ``loaded`` is a number. It is four times the number of the material in the file,
+    plus 2 if the vertices have colours, plus 1 if the vertices have texture coordinates.
     """
     used = np.unique(loaded.mesh.material).tolist()
     read = {number: found.read(number) for number in sorted({kind // 4 for kind in used})}
@@ -243,7 +243,7 @@ def _with_materials(loaded: LoadedMesh, found: Found) -> LoadedMesh:
 def merged(loaded: LoadedMesh, of: Mapping[int, FileMaterial]) -> LoadedMesh:
     """A mesh with materials numbered from 0. Equal materials are merged.
 
-    The faces of ``loaded`` have keys of ``of``, the materials.
+    The material of a face of ``loaded`` is a key of ``of``, which has the materials.
 
     Raises
     ------

@@ -22,9 +22,9 @@ def split_obj(data: bytes, found: Found) -> tuple[bytes, list[str]]:
     """An OBJ text with an object for each material, and the names of material files.
 
     An object's name is the number of its material. Statements of positions, normals, texture coordinates,
-    faces and objects stay, a line for each. Statements of other kinds are recorded as not read. A backslash
-    at the end of a line continues the line, but not in a comment. The text after ``#`` is part of a
-    material's name, as in ``usemtl Material #25``, and no comment.
+    faces and objects stay, each in a line of its own. Statements of other kinds are recorded as not read. A
+    backslash at the end of a line continues the line, but not in a comment. In a material's name ``#`` begins
+    no comment, as in ``usemtl Material #25``.
     """
     numbers = {"": 0}
     libraries = []

@@ -148,8 +148,8 @@ def _sides(triangle: Sequence[int]) -> Iterator[tuple[int, int]]:
 def _completed(triangles: list[list[int]], count: int) -> list[list[int]]:
     """Triangles of earcut, and triangles of the corners and parts that earcut left out.
 
-    earcut leaves out corners on straight sides, spikes, and what it cannot cut. The missing parts are loops,
-    whose sides belong to the polygon or to triangles. Each loop is cut as a fan.
+    earcut leaves out corners on straight sides, spikes, and parts that it cannot cut. The missing parts are
+    loops. The sides of a loop belong to the polygon or to triangles. Each loop is cut as a fan.
     """
     taken = {side for triangle in triangles for side in _sides(triangle)}
     outline = {(k, (k + 1) % count) for k in range(count)}

@@ -8,7 +8,7 @@ __all__ = ["strip_triangles"]
 def strip_triangles(corners: np.ndarray) -> np.ndarray:
     """Triangles of strips. Triangle i has the corners i, i + 1, i + 2, in reverse order if i is odd.
 
-    Triangles with a corner twice, which join strips, are left out.
+    A triangle with the same corner twice only joins two strips, and is left out.
 
     Parameters
     ----------

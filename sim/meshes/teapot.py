@@ -81,9 +81,9 @@ def teapot(triangles: int = 10_000) -> Mesh:
 
     Each of the 32 bicubic patches ``S(u, v) = sum_ij B_i(u) B_j(v) P_ij`` becomes a grid of n x n
     quadrilaterals of two triangles. The patches of the knob and of the bottom meet in a point each. The 8 n
-    triangles without area there are left out, and for n = 1 four more at the spout's lip. Normals are
-    ``dS/dv x dS/du``, of unit length, and at the two points their limit. Patches that join smoothly share the
-    vertices of their seam.
+    triangles without area there are left out, and for n = 1 four more at the spout's lip. A normal is the
+    vector ``dS/dv x dS/du``, normalised. At the two points it is the limit of this vector. Patches that join
+    smoothly share the vertices of their seam.
 
     Parameters
     ----------
