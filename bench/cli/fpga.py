@@ -100,7 +100,8 @@ def command(
     The first line has the parts of the FPGA. Clock rates are in MHz, over the seeds. The slowest path is from
     the slowest seed: the delay in cells, the delay between cells, and the registers at both ends. The cache
     keeps earlier placements. On ECP5, registers beside a multiplier move into the multiplier. The tool does
-    not time paths between registers on both sides of a multiplier. Lines below the table name these designs.
+    not time paths between registers on both sides of a multiplier. Lines below the table name the designs
+    with these paths.
 
     \b
     Examples:

@@ -130,9 +130,9 @@ def _parts(name: str) -> dict[str, int]:
 
 
 def hardware(unit: str, baseline: str) -> dict[str, float | None]:
-    """Cycles for each result, and parts, of the baseline, divided by those of the unit.
+    """Ratios of the baseline to the unit: cycles for each result, and parts.
 
-    Both are keys of `UNITS`.
+    Unit and baseline are keys of `UNITS`.
 
     Returns
     -------
