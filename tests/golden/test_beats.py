@@ -1,4 +1,4 @@
-"""Spans whose arrays do not belong together are refused."""
+"""Spans whose arrays do not fit each other are refused."""
 
 import numpy as np
 import pytest

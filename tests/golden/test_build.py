@@ -1,4 +1,4 @@
-"""Build options: what is refused, and that pixels do not depend on them."""
+"""Build options: some combinations are refused, and pixels do not depend on the options."""
 
 import pickle
 from dataclasses import fields
@@ -43,7 +43,10 @@ def test_unknown_values(options, message):
     ],
 )
 def test_options_that_exclude_each_other(option, options):
-    """None is ignored; the error survives the way from another process."""
+    """Options that exclude each other are refused, and none is ignored.
+
+    The error survives the transfer from another process.
+    """
     with pytest.raises(BuildError) as error:
         preset().built(**options)
     again = pickle.loads(pickle.dumps(error.value))
@@ -61,7 +64,7 @@ def test_styles_of_geometry():
 
 
 def test_options_of_shading_alone():
-    """What the rest of a core reads is at its defaults, whatever is added."""
+    """The options that other parts of a core read keep their defaults, whatever other options are given."""
     build = Build("compact", 9, 20, top="render", setups=2, coarse=COARSE, bus="axi")
     assert build.shading == Build("compact", 9, 20)
     default = Build()

@@ -42,7 +42,10 @@ def scene(lights, material=None, ambient_light=(1.0, 1.0, 1.0)):
 
 
 def test_codes_of_a_scene():
-    """L = V: the half-way vector is the light's. L at a right angle: between the two."""
+    """The half-way vector is that of the light if L = V.
+
+    If L is at a right angle to V, it is between both.
+    """
     lights = [Light((0, 0, 5), (1, 0.5, 2)), Light((3, 0, 0))]
     given = scene(lights, ambient_light=(0.5, 1, 2))
     np.testing.assert_allclose(given.camera.viewer, (0, 0, 1), atol=1e-15)
@@ -53,7 +56,8 @@ def test_codes_of_a_scene():
     np.testing.assert_array_equal(constants.halfway[0], [0, 0, ONE])
     np.testing.assert_allclose(constants.halfway[1] / ONE, [0.5**0.5, 0, 0.5**0.5], atol=2.0**-17)
     scale = 255 * 64
-    # Half up: 0.6 * 255 * 64 is 9792, 0.5 * 0.5 a quarter, and so on; all off by at most half a code.
+    # Codes are rounded half up: 0.6 * 255 * 64 is 9792, 0.5 * 0.5 a quarter, and so on. All are off by at
+    # most half a code.
     diffuse = scale * np.array([[0.6, 0.25, 0.8], [0.6, 0.5, 0.4]])
     specular = scale * np.array([[0.5, 0.125, 2], [0.5, 0.25, 1]])
     assert np.abs(constants.diffuse - diffuse).max() <= 0.5
@@ -93,14 +97,14 @@ def test_what_does_not_fit_is_refused():
     ):
         with pytest.raises(ValueError, match=r"^the intensity of a term must be 0 to 8$"):
             FrameConstants.of(bright)
-    # A light that is eight times the full channel is the brightest.
+    # A light of eight times the full channel is the brightest that is allowed.
     assert FrameConstants.of(scene([Light((0, 0, 1), (8, 8, 8))])).specular[0, 2] == 8 * 255 * 64
 
 
 @pytest.mark.parametrize("energy", ["phong", "blinn", "cosquad_lin"])
 def test_energy_factor_multiplies_the_specular_colour(energy):
-    """Against the reflected energy itself, integrated: that of the highlight is k_s, to the rounding."""
-    # Blinn sees half the angle when the viewer looks along the normal.
+    """The integrated reflected energy of the highlight is k_s, up to rounding."""
+    # If the viewer looks along the normal, Blinn's angle is half of the light's angle.
     model, share = ("blinn", 0.5) if energy == "blinn" else (energy, 1)
     for exponent in (2, 10, 30):
         material = Material((0.1, 0.2, 0.3), (0.6, 0.5, 0.4), (0.5, 0.25, 1), exponent)
@@ -122,13 +126,13 @@ def test_energy_factor_multiplies_the_specular_colour(energy):
 
 
 def test_fresnel_is_in_the_specular_colour():
-    """Of each light its own, k_s F, with V·H = cos 60 degrees and 1; of a point light k_s F_0."""
+    """Each light has its own k_s F, here with V·H = cos 60 degrees and 1. A point light has k_s F_0."""
     material = Material((0.1, 0.2, 0.3), (0.6, 0.5, 0.4), (0.5, 1, 1), 9, fresnel=(0.04, 0.5, 1))
     lights = [Light((3**0.5, 0, -1)), Light((0, 0, 5)), Light((1, 1, 1), (0, 0, 0))]
     found = FrameConstants.of(scene(lights, material))
     expected = [[0.5 * (0.04 + 0.96 / 32), 0.5 + 0.5 / 32, 1], [0.02, 0.5, 1], [0, 0, 0]]
     assert np.abs(found.specular / (255 * 64) - expected).max() <= 2.0**-7 / 255
-    # A light that is off has no vectors, either: its terms are 0.
+    # A light that is off has no vectors either: its terms are 0.
     assert not any(getattr(found, name)[2].any() for name in ("direction", "halfway", "diffuse"))
     assert found.direction[0].any()
     near = FrameConstants.of(scene([Light(position=(1e9, 0, -1e9)), *lights], material))
@@ -158,7 +162,7 @@ def test_models_without_an_energy_factor_are_refused():
 
 @pytest.mark.parametrize("lights", [1, 2, 16])
 def test_writes_hold_every_constant(lights):
-    """Read back from the beats by the table of addresses, sign and all."""
+    """The constants are read back from the beats by the table of addresses, with their signs."""
     rng = np.random.default_rng(lights)
     vectors, colors = rng.integers(-ONE, ONE + 1, (2, lights, 3)), rng.integers(0, 2**17, (2, lights, 3))
     constants = FrameConstants(1000, rng.integers(0, 2**17, 3), *vectors, *colors)
@@ -195,7 +199,10 @@ def test_address_table_tells_every_address_once(lights, axes):
 
 
 def test_codes_of_several_materials():
-    """Each material's own exponent and colours, under the lights of all: those of a scene of it alone."""
+    """Each material has its own exponent and colours, and all share the lights.
+
+    Its constants equal those of a scene with this material alone.
+    """
     rng = np.random.default_rng(5)
     lights = [Light((0, 0, 5), (1, 0.5, 2)), Light((3, 0, 0))]
     materials = [Material(*rng.uniform(0, 0.5, (3, 3)), n) for n in (1, 20, 1000)]
@@ -221,12 +228,12 @@ def test_writes_of_a_material_begin_with_its_index():
         assert (writes["address"][0], writes["data"][0]) == (MATERIAL_ADDRESS, index)
         for name in ("address", "data"):
             np.testing.assert_array_equal(writes[name][1:], plain[name])
-    # No other constant has the address.
+    # No other constant has this address.
     assert MATERIAL_ADDRESS not in plain["address"]
 
 
 def test_writes_and_address_table_of_an_albedo():
-    """Each word of an albedo's constants has a line; other designs have neither."""
+    """The table has a line for each word of an albedo's constants. Other designs have no such lines."""
     rng = np.random.default_rng(6)
     plain = FrameConstants(7, rng.integers(0, 2**17, 3), *rng.integers(0, 2**17, (4, 2, 3)))
     texels = TexelMemory(4).load([Texture(np.ones((2, 2, 3)))])
@@ -245,7 +252,7 @@ def test_writes_and_address_table_of_an_albedo():
 
 @pytest.mark.parametrize("lights", [1, 16])
 def test_address_table_of_several_materials(lights):
-    """One line more, for the index."""
+    """With several materials the table has one further line, for the index."""
     more = [line for line in address_table(lights, 2) if line not in address_table(lights)]
     assert len(more) == 1
     assert int(more[0].split()[0]) == MATERIAL_ADDRESS

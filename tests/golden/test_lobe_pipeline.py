@@ -31,7 +31,7 @@ def scene(exponent=20, roughness=None, mesh=None, size=SMALL):
 
 
 def several(parameters, name="roughness"):
-    """Three materials on the faces of a sphere."""
+    """Make a sphere whose faces have three materials."""
     given = scene()
     materials = [replace(given.material, **{name: value}) for value in parameters]
     mesh = replace(given.mesh, material=np.arange(len(given.mesh.faces)) % len(materials))
@@ -40,7 +40,7 @@ def several(parameters, name="roughness"):
 
 @pytest.mark.parametrize("exponent", [1, 10, 100, 1000])
 def test_frame_is_exact_blinn(exponent):
-    """No channel is off by more than rounding and 0.05 LSB of the method in float64."""
+    """No channel differs from the method in float64 by more than the rounding and 0.05 LSB."""
     design = preset("renormalise", "blinn")
     given = scene(exponent, mesh=teapot(2000))
     found = compare(given, design, model_frame(given, design))
@@ -52,7 +52,7 @@ def test_frame_is_exact_blinn(exponent):
         given, preset("renormalise", "cosquad"), model_frame(given, preset("renormalise", "cosquad"))
     )
     assert found.total_error.rmse_lsb < (0.5 if exponent < 1000 else 0.6) * of_squares.total_error.rmse_lsb
-    # What is left is the method's: normals are linear along a span.
+    # The rest is the method's error: normals are linear along a span.
     assert found.method_error.max_lsb < 0.75
 
 
@@ -73,7 +73,8 @@ def test_frame_is_exact_ggx(roughness):
 @pytest.mark.parametrize("method", METHODS)
 @pytest.mark.parametrize("model", LOBES)
 def test_every_method_serves_every_lobe(method, model):
-    """Against the method in float64, by the error of the operand at the steepest point of the lobe."""
+    """The difference from the method in float64 is within the error of the operand at the steepest point of
+    the lobe."""
     given = scene(30, mesh=teapot(400), size=(64, 48))
     design = preset(method, model)
     frame = model_frame(given, design)
@@ -82,7 +83,7 @@ def test_every_method_serves_every_lobe(method, model):
     steepness = design.steepness(given.material)
     widest = min(design.interpolator.widest_span(steepness), design.interpolator.MAX_ANGLE)
     operand = design.interpolator.operand_error(int(frame.prepared.spans.length.max()), widest)
-    # k_d and k_s of `scene_for`; colours are rounded to 1/64 LSB, and so are the pixels.
+    # k_d and k_s are those of `scene_for`. Colours are rounded to 1/64 LSB, and pixels are rounded, too.
     bound = 0.5 + 3 / 64 + 255 * (0.4 * operand + 0.55 * (steepness * operand + 0.06 / 255))
     assert found.arithmetic_error.max_lsb < bound
 
@@ -100,7 +101,7 @@ def test_gate_changes_no_pixel(model, parameters, cutoff):
     frame = model_frame(given, gated)
     lit = gated.lit_spans(frame.prepared.spans, constants)[:, 0]
     shares = [lit[frame.prepared.spans.material == index].mean() for index in range(3)]
-    # The narrower the highlight, the fewer spans it is on.
+    # The narrower the highlight, the fewer spans it touches.
     assert 0 < min(shares[0], shares[2]) < max(shares[0], shares[2]) <= 1
     exact = model_frame(given, preset("quadratic", model, materials=3))
     # Half an LSB at intensity 1, and the rounding of a channel.
@@ -117,7 +118,7 @@ def test_equal_lobes_share_a_bank():
     assert [of.lobe.parameter for of in constants] == [0.3, 0.6, 0.3]
     writes = writes_of(constants)
     loads = writes["data"][writes["address"] == LOBE_ADDRESS]
-    # Two tables of 336 entries, the end, and the bank.
+    # Two tables take 336 entries, the end entry and the bank each.
     assert len(loads) == 2 * 338
     assert loads[[0, 338]].tolist() == [1 << 17, 1 << 17 | 1]
     assert (writes["address"] == THRESHOLD_ADDRESS).sum() == 3
@@ -134,7 +135,7 @@ def test_banks_that_do_not_suffice_are_refused():
 
 
 def test_fixed_tables():
-    """They take no writes, and the pixels are the same; other lobes are refused."""
+    """Fixed tables take no writes and give the same pixels. Other lobes are refused."""
     given = scene(40)
     fixed, loaded = preset("renormalise", "blinn", exponent=40), preset("renormalise", "blinn")
     np.testing.assert_array_equal(model_frame(given, fixed).image, model_frame(given, loaded).image)
@@ -147,13 +148,13 @@ def test_fixed_tables():
 
 
 def test_a_curve_of_ones_own():
-    """A function as the model: rendered as it is in float64."""
+    """A function can be the model. Its frame equals the rendering in float64."""
     curve = TabulatedModel("steps", function=lambda c: np.round(c * 4) / 4)
     design = preset("renormalise", curve)
     assert (design.model, design.specular.banks) == ("steps", 1)
     given = scene()
     image = model_frame(given, design).image
-    # Four levels and the diffuse term, which is smooth.
+    # The picture has four levels and the diffuse term, which is smooth.
     assert len(np.unique(image)) > 50
     found = compare(given, design, model_frame(given, design))
     assert found.arithmetic_error.p999_lsb < 0.6 * 255 / 4
@@ -194,7 +195,10 @@ def test_bad_designs_are_refused():
 
 
 def test_energy_factor_of_a_roughness():
-    """k_s times the factor of the material's roughness; what is too bright is told with the roughness."""
+    """The factor of the material's roughness multiplies k_s.
+
+    A colour that is too bright is refused, and the message names the roughness.
+    """
     given = scene(roughness=0.9)
     plain, normalised = (FrameConstants.of(given, energy=energy) for energy in (None, GGX))
     ratio = normalised.specular / plain.specular

@@ -19,11 +19,11 @@ AMBIENT = 0.1
 UP = np.array([0.0, 0.0, 1.0])
 
 
-# Stiff cases, one span each.
+# Stiff cases of one span each.
 
 
 def constants_of(lights, exponent=20, ambient=AMBIENT, viewer=UP):
-    """(direction, diffuse, specular) of each light, white."""
+    """The direction, diffuse colour and specular colour of each white light."""
     count = len(lights)
     halfway = np.array([halfway_vector(direction, viewer) for direction, _, _ in lights])
     present = halfway.any(axis=1)
@@ -56,7 +56,7 @@ def tilted(degrees):
     ("length", "exponent"), [(1, 1), (2, 2), (3, 3), (16, 10), (4095, 100), (3, 500), (4095, 1000)]
 )
 def test_flat_span_has_one_color(length, exponent):
-    """Angle 0 with the peak on every pixel: one colour, of one normal."""
+    """With equal normals and the peak on every pixel, all pixels have the same colour."""
     pixels = shade(UP, UP, length, constants_of([(UP, 0.4, 0.3)], exponent))
     np.testing.assert_array_equal(pixels.color, np.full((length, 3), 204))
     np.testing.assert_array_equal(pixels.x, (7 + np.arange(length)) % 4096)
@@ -65,9 +65,11 @@ def test_flat_span_has_one_color(length, exponent):
 
 
 def test_terminator():
-    """A light at right angles gives nothing; a step further it gives a diffuse term, and the highlight whole.
+    """A light at a right angle gives nothing.
 
-    The highlight comes with a jump: N.H is 0.707 there, whose term is not 0 for small exponents.
+    One step further it gives a diffuse term and the whole highlight.
+
+    The highlight begins with a jump: N.H is 0.707 there, and its term is not 0 for small exponents.
     """
     right_angle = constants_of([(np.array([1.0, 0, 0]), 1.0, 1.0)], 1)
     np.testing.assert_array_equal(shade(UP, UP, 3, right_angle).color, 26)
@@ -79,17 +81,17 @@ def test_terminator():
 
 @pytest.mark.parametrize("exponent", [1, 1000])
 def test_light_opposite_the_viewer(exponent):
-    """``L = -V``: no half-way vector and no highlight, on any side; nothing is divided by 0."""
+    """With ``L = -V`` there is no half-way vector and no highlight on any side. Nothing is divided by 0."""
     constants = constants_of([(-UP, 0.5, 8.0)], exponent)
     np.testing.assert_array_equal(shade(UP, UP, 2, constants).color, 26)
     np.testing.assert_array_equal(shade(-UP, -UP, 2, constants).color, round(255 * 0.6))
 
 
 def test_highlight_wholly_inside_a_span():
-    """n = 1000: both ends are dark, the peak is where the curve passes it."""
+    """At n = 1000 both ends are dark, and the peak is where the curve passes H."""
     constants = constants_of([(UP, 0.0, 1.0)], 1000, ambient=0)
     channel = shade(tilted(-10), tilted(10), 101, constants).color[:, 0].astype(int)
-    # The curve is 1.8e-6 short at its middle's sides, not there: the middle is exact to 2^-18.
+    # The curve is 1.8e-6 too short beside its middle. The middle itself is exact to 2^-18.
     assert channel[50] >= 253
     assert channel.argmax() == 50
     assert (np.diff(channel[:51]) >= 0).all()
@@ -102,7 +104,7 @@ def test_sixteen_lights_over_full_brightness():
     np.testing.assert_array_equal(shade(UP, UP, 2, bright).color, 255)
     np.testing.assert_array_equal(shade(-UP, -UP, 2, bright).color, 26)
     dim = constants_of([(UP, 1 / 32, 1 / 64)] * 16, ambient=0)
-    # 16 (k_d + k_s) = 0.75, off by 32 operands' halves.
+    # 16 (k_d + k_s) = 0.75, which is off by half a code of each of 32 operands.
     assert abs(int(shade(UP, UP, 2, dim).color[0, 0]) - 191.25) <= 0.5 + 32 * 2.0**-7 + 0.01
 
 
@@ -114,7 +116,7 @@ def test_ambient_only():
 
 
 def test_encoded_pixels():
-    """Ambient light alone, with and without lights, and lit spans: each code by the curve in float64."""
+    """Ambient light with and without lights, and lit spans: each code follows from the curve in float64."""
     for lights, ambient in ((0, 0.001), (1, 0.02), (0, 0.3), (1, 8.0)):
         constants = constants_of([(UP, 0.0, 0.0)], ambient=ambient)
         if not lights:
@@ -210,7 +212,8 @@ def test_spans_that_a_pipeline_does_not_take(given, changed, message):
 
 
 def spans_near_a_highlight(rng, halfway, level, angle):
-    """Ends of arcs whose great circle comes as near to H as a cosine says, there or a bit before or after."""
+    """Ends of arcs whose great circle comes as near to H as a cosine says: within the arc, or a little
+    outside."""
     count = len(level)
     side = normalise(np.cross(halfway, rng.normal(size=(count, 3))))
     top = halfway * level[:, np.newaxis] + side * np.sqrt(1 - level**2)[:, np.newaxis]
@@ -229,7 +232,7 @@ GATED = [(name, None) for name in BY_NORMALS] + [
 @pytest.mark.parametrize("model", ["cosquad", "coscos4", "exp", "blinn_product"])
 @pytest.mark.parametrize(("method", "operand"), GATED)
 def test_gated_spans_have_no_highlight(method, operand, model):
-    """About the threshold of each exponent, where the gate has to let spans through that seem dark."""
+    """Spans about the threshold of each exponent, where the gate has to let spans through that seem dark."""
     rng = np.random.default_rng(3)
     design = preset(method, model, operand=operand)
     gate = design.highlight_gate
@@ -272,7 +275,10 @@ def test_gated_spans_have_no_highlight(method, operand, model):
     ],
 )
 def test_published_methods_are_worse(published, method, degrees, factor):
-    """N.L against the curve of both, in float64: the mended method is so much nearer to it."""
+    """N.L is compared in float64 with the curve that both methods stand for.
+
+    The corrected method is nearer by a factor.
+    """
     rng = np.random.default_rng(8)
     left, right = (quantise(end) for end in pairs_at(rng, 300, rng.uniform(0.5, degrees, 300)))
     vector = quantise(normalise(left[:1] + rng.normal(size=3) * ONE / 8))

@@ -23,20 +23,20 @@ AMBIENT, DIFFUSE, SPECULAR = 0.1, 0.6, 0.5
 LARGEST_ANGLE = 20.0
 STEP = 2.0**-17
 
-# Largest |model - float64 * 255| in LSB, the half of the last rounding included, over 10^7 pixels of the
-# sweep below, half of them about the highlight, rounded up.
+# Largest |model - float64 * 255| in LSB, with the half of the last rounding, rounded up. The sweep has 10^7
+# pixels, half of them about the highlight.
 MEASURED = {1: 0.51, 10: 0.52, 100: 0.62, 1000: 1.6}
 
 
 def error_bounds(model, exponent):
-    """Bounds of the error of N.L, and of a channel in LSB, summed from those of the units.
+    """Bounds of the error of N.L, and of a channel in LSB: sums of the units' bounds.
 
-    `quantise` moves a vector by half a step along itself and by sqrt(3) steps across. Ends that turn a little
-    turn the curve between them, which keeps its length to second order: what moves a normal along itself are
-    the ends' lengths alone. A highlight feels a move across times the sine of the largest angle that it
-    reaches, ``1 - cos gamma = 1/k``. The weights of the curve's three normals add up to 1.25 at most, and the
-    middle moves by ``1/cos(psi/2)`` of the ends' mean. The middle adds `MiddleNormal.ERROR` a component, the
-    setup three relative steps of G and one of P, the accumulator half a step a component.
+    `quantise` moves a vector by half a step along itself and by sqrt(3) steps across. If the ends turn a
+    little, the curve between them turns, and its length changes at second order only. So only the lengths of
+    the ends move a normal along itself. A move across changes a highlight by the sine of the largest angle
+    with light, ``1 - cos gamma = 1/k``. The weights of the curve's three normals add up to at most 1.25, and
+    the middle moves by ``1/cos(psi/2)`` of the mean of the ends. The middle adds `MiddleNormal.ERROR` a
+    component, the setup three relative steps of G and one of P, the accumulator half a step a component.
     """
     k = REFLECTION_MODELS[model].slope(exponent)
     sine = np.sqrt(1 - max(1 - 1 / k, 0) ** 2)
@@ -45,20 +45,23 @@ def error_bounds(model, exponent):
     setup = STEP * (2.12 * half + 3 * 4 * (1 - np.cos(half)))
     drift = DifferenceSetup.FORMAT.step * (64 + 64**2 / 2)
     common = root * MiddleNormal.ERROR + setup + root * (drift + STEP / 2)
-    # Both the normal and the constant vector are quantised.
+    # The normal and the constant vector are both quantised.
     quantised = 1.25 / np.cos(half) + 1
     cosine = common + quantised * STEP * (0.5 + root)
     highlight_cosine = common + quantised * STEP * (0.5 + root * sine)
-    # Lengths are ONE / 2^17: cosines come out 2^-16 short.
+    # Lengths are ONE / 2^17, so cosines are 2^-16 too small.
     diffuse = cosine + 2.0**-16 + 2.0**-18
-    # Of a base of at most 1 the square doubles the error.
+    # The square of a base of at most 1 doubles the error.
     specular = 2 * k * highlight_cosine + Specular.ERROR
     operands = 3 * Intensity.COLOR_FORMAT.step / 2
     return cosine, 0.5 + operands + 255 * (DIFFUSE * diffuse + SPECULAR * specular)
 
 
 def random_spans(rng, count, exponent, light, halfway, largest=LARGEST_ANGLE):
-    """Random normals; half of the spans pass near the highlight's peak, a tenth near the terminator."""
+    """Spans of random normals.
+
+    Half of them pass near the highlight's peak, and a tenth near the terminator.
+    """
     angle = rng.uniform(0, largest, count)
     left, right = pairs_at(rng, count, angle)
     near = count * 6 // 10
@@ -75,7 +78,8 @@ def random_spans(rng, count, exponent, light, halfway, largest=LARGEST_ANGLE):
 
 
 def sweep(rng, frames, count, model, exponent):
-    """Errors in LSB of the well-posed pixels, how many others there are, and how many pixels saturate."""
+    """Errors in LSB of the well-posed pixels, the number of other pixels, and the number of saturated
+    pixels."""
     errors, ill_posed, full = [], 0, 0
     band, _ = error_bounds(model, exponent)
     design = preset("quadratic", model)
@@ -102,7 +106,7 @@ def sweep(rng, frames, count, model, exponent):
         normals = interpolate("quadratic", left[span], right[span], t)
         exact = intensity(normals, material, [Light(light)], (1, 1, 1), viewer, REFLECTION_MODELS[model])
         error = np.abs(pixels.color - 255 * saturate(exact)).max(axis=1)
-        # Where N.L may have either sign, light and highlight may be there or not.
+        # At these pixels N.L may have either sign, so light and highlight may be on or off.
         terminator = np.abs(normals @ light) <= band
         errors.append(error[~terminator])
         ill_posed += np.count_nonzero(terminator)
@@ -115,18 +119,19 @@ def check(errors, ill_posed, model, exponent):
     _, bound = error_bounds(model, exponent)
     assert worst <= bound
     assert worst <= MEASURED[exponent]
-    # The promise: one LSB to exponent 100, from the bound alone.
+    # The bound alone promises one LSB up to exponent 100.
     if exponent <= 100:
         assert bound < 1
     assert worst > max(0.5, bound / 5)
-    # N.L is within 6e-5 of 0 for as large a share of normals all around; a tenth of the spans are about it.
+    # For normals in all directions this is the share with N.L within 6e-5 of 0. A tenth of the spans are near
+    # the terminator.
     assert 0 < ill_posed < 2e-3 * len(errors)
 
 
 @pytest.mark.parametrize("model", ["cosquad", pytest.param("cosquad_lin", marks=pytest.mark.long)])
 @pytest.mark.parametrize("exponent", MEASURED)
 def test_arithmetic_error(exponent, model):
-    """Spans to 20 degrees, 1 to 64 pixels, 4e5 pixels a case."""
+    """Spans of up to 20 degrees and 1 to 64 pixels, with 4e5 pixels a case."""
     rng = np.random.default_rng(exponent)
     errors, ill_posed, full = sweep(rng, 3, 4200, model, exponent)
     assert len(errors) > 380_000

@@ -1,4 +1,5 @@
-"""Several pipelines: a scanline belongs to one of them, and together they give the pixels of one."""
+"""Several pipelines: each scanline belongs to one pipeline, and together they give the pixels of a single
+pipeline."""
 
 from dataclasses import fields
 
@@ -17,7 +18,7 @@ def rows(pixels):
 
 @pytest.mark.parametrize("pipes", PIPES)
 def test_pipelines_together_give_the_pixels_of_one(pipes):
-    """In the order of the spans within each scanline; and the counts are sums."""
+    """Within each scanline pixels are in the order of the spans. Counters are sums."""
     rng, design = np.random.default_rng(pipes), preset(y_bits=5)
     several = PixelPipelines(design.built(pipes=pipes))
     spans = any_spans(rng, design, rng.integers(0, 9, 300))

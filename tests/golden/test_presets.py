@@ -1,4 +1,4 @@
-"""Designs by name: a line about each method and model, and names that there are not."""
+"""Designs by name: a line about each method and model, and refusals of unknown names."""
 
 import numpy as np
 import pytest
@@ -43,7 +43,7 @@ CURVE = TabulatedModel.of_points("curve", np.array([0.0, 0.5, 1.0]), np.array([0
 
 @pytest.mark.parametrize("model", [*MODELS, *LOBES, *MIRROR_LOBES, CURVE, None], ids=str)
 def test_the_default_method_serves_every_model(model):
-    """By the unit that the model has: ``quotient`` where that is a table."""
+    """The default follows from the unit of the model: ``quotient`` if the model has a table."""
     made = preset(model=model)
     assert made.method == ("renormalise" if model in MODELS else "quotient")
     assert made == preset(default_method(model), model)

@@ -6,7 +6,7 @@ __all__ = ["ends_of"]
 
 
 def ends_of(rng, model, length, ratio, crossed=512.0):
-    """Ends of attributes, and 1/W at both ends; some colours are 0 or 1 at an end."""
+    """Attributes and 1/W at both ends. Some colours are 0 or 1 at an end."""
     count = len(length)
     colors = rng.random((2, count, 3))
     colors[:, ::3] = np.rint(colors[:, ::3])

@@ -1,4 +1,4 @@
-"""Model of the albedo path: products of both colours, and what it refuses."""
+"""Model of the albedo path: products of vertex colours and textures, and refusals."""
 
 import re
 
@@ -17,7 +17,7 @@ LENGTH = np.array([1, 2, 9, 300])
 
 @pytest.mark.parametrize("colors", [True, False])
 def test_colours_times_texels_of_two_materials(colors):
-    """Against float64, of two textures. With both colours a rounding of 2^-17 comes from the product."""
+    """Two textures are compared with float64. With vertex colours the product adds a rounding of 2^-17."""
     rng = np.random.default_rng(2)
     images = [Texture(rng.random((8, 4, 3))), Texture(rng.random((2, 2, 3)), filter="nearest")]
     path = Albedo(colors, TextureSampler(TexelMemory(64)))
@@ -42,7 +42,8 @@ def test_colours_times_texels_of_two_materials(colors):
         exact[own] *= image.sample(uv[own], np.zeros(own.sum(), dtype=np.int64))
         if image.filter == "nearest":
             inner[own] = (np.abs(uv[own] * 2 - 1) > 1e-3).all(axis=1)
-    # Rounding of texels, of shares by the contrast, and of the product.
+    # The bound has the rounding of texels, the rounding of shares times the contrast, and the rounding of the
+    # product.
     assert np.abs(found.values - exact)[inner].max() < 2.0**-12 + 2.0**-13
     assert found.codes.max() <= 1 << 16
 

@@ -1,4 +1,4 @@
-"""Spans of attributes: words against exact fractions and float64, ends of words, what does not fit."""
+"""Spans of attributes: words against exact fractions and float64, ends of words, refusals."""
 
 import re
 from fractions import Fraction
@@ -16,7 +16,10 @@ LENGTHS = np.array([1, 2, 3, 4, 5, 17, 100, 1000, 4095])
 
 
 def test_words_are_the_rounded_lines_of_the_codes():
-    """In exact fractions, at the ends of spans and between; the length of a span may be 4095."""
+    """Words are compared with exact fractions at the ends of spans and between them.
+
+    Spans have up to 4095 pixels.
+    """
     rng = np.random.default_rng(3)
     ends, weights = ends_of(rng, BOTH, LENGTHS, 4)
     spans = SpanAttributes.quantise(BOTH, *ends, LENGTHS, weights, level=np.arange(9))
@@ -30,7 +33,7 @@ def test_words_are_the_rounded_lines_of_the_codes():
         for line in range(6):
             exact = int(start[s, line]) + Fraction(i * int(step[s, line]), 2 ** int(spans.exponent[s]))
             rounded = (exact + Fraction(1, 2)).__floor__()
-            # A step of 1 or more in a span of two pixels wraps.
+            # In a span of two pixels a step of 1 or more wraps.
             assert (int(found[at, line]) - rounded) % 2**24 == 0
             assert s == 1 or int(found[at, line]) == rounded
     assert (words.level == span).all()
@@ -41,7 +44,8 @@ def test_words_are_within_their_bound_and_do_not_wrap(ratio):
     rng = np.random.default_rng(int(ratio))
     length = np.r_[np.repeat(LENGTHS[:-1], 40), 4095]
     ends, weights = ends_of(rng, BOTH, length, ratio)
-    # Texture coordinates that cross their whole range, from corner to corner, most of all in two pixels.
+    # Texture coordinates cross their whole range between two corners. The steps are largest in spans of two
+    # pixels.
     ends[0, ::2, 3:], ends[1, ::2, 3:] = 7 - 512 * 0.999, 7 + 512 * 0.999
     spans = SpanAttributes.quantise(BOTH, *ends, length, weights)
     whole = np.flatnonzero(length[::2] > 1) * 2
@@ -81,7 +85,10 @@ def test_without_perspective_words_are_the_attributes():
 
 
 def test_a_base_comes_into_its_range():
-    """By whole periods, or with clamp to the place from which on all is the border's texel."""
+    """A base changes by whole periods.
+
+    With clamp it moves to the limit beyond which every texel is the border's.
+    """
     model = AttributeSpans(colors=False, coordinates=True, perspective=False)
     ends = np.array([[[5000.25, -2100.5]], [[5001.25, -2099.5]]])
     spans = SpanAttributes.quantise(model, *ends, np.array([2]), periodic=True)

@@ -12,7 +12,7 @@ from .ends import ends_of
 
 
 def test_reciprocal_is_within_its_bound_over_the_whole_table():
-    """Every fifth x, and some words of every shift."""
+    """Every fifth x is tried, and some words of every shift."""
     unit = Attributes()
     for shift in range(16):
         normal = np.arange(1 << 22, 1 << 23, 1009 if shift else 5)
@@ -22,7 +22,7 @@ def test_reciprocal_is_within_its_bound_over_the_whole_table():
         assert np.abs(rest.values).max() < 0.126
         x = np.ldexp(weight.astype(float), shift - 22)
         reciprocal = rest.values + 0.5 + halves / 4
-        # So a colour's quotient is under 2.
+        # So the quotient of a colour is under 2.
         assert reciprocal.max() <= 1
         relative = reciprocal * x - 1
         assert np.abs(relative).max() <= Attributes.RECIPROCAL_ERROR
@@ -36,7 +36,10 @@ def test_the_reciprocal_and_the_products_are_within_their_budget():
 @pytest.mark.parametrize("perspective", [True, False])
 @pytest.mark.parametrize("ratio", [1, 2, 4, 16, 1e4])
 def test_attributes_of_spans_against_float64(ratio, perspective):
-    """From the ends of spans of 1 to 4095 pixels to each pixel, within the bound, which is not far off."""
+    """Spans of 1 to 4095 pixels are quantised at their ends.
+
+    Each pixel is within the bound, and some pixels are near it.
+    """
     rng = np.random.default_rng(int(ratio))
     length = np.r_[1, 2, 2, 3, 4095, rng.integers(1, 2000, 60)]
     model = AttributeSpans(coordinates=True, perspective=perspective)
@@ -67,7 +70,10 @@ def _words(unit, numerators, weight):
 
 
 def test_colours_saturate_and_reach_1():
-    """U over w by its rounding is 1, under 0 it is 0, and U = w is 1 at each of many w."""
+    """If rounding makes U larger than w, the colour is 1.
+
+    If U is under 0, the colour is 0. If U = w, it is 1 at each of many w.
+    """
     unit = Attributes()
     weight = np.r_[300, 299, 1 << 22, (1 << 23) - 1]
     colors = unit.compute(_words(unit, weight + np.r_[3, 3, 3, 0], weight)).colors
@@ -79,7 +85,10 @@ def test_colours_saturate_and_reach_1():
 
 
 def test_coordinates_at_their_ends_do_not_wrap():
-    """U over w by six steps, as two words with their errors can be, at 1/W of every size, and both signs."""
+    """U exceeds w by six steps, as the errors of both words can make it.
+
+    1/W has every size, and U has both signs.
+    """
     unit = Attributes(AttributeSpans(colors=False, coordinates=True))
     weight = np.unique(np.r_[np.arange(252, 600), np.floor(2.0 ** np.linspace(8, 22.999, 3000)).astype(int)])
     numerator = np.minimum(weight + 6, (1 << 23) - 1)

@@ -1,4 +1,4 @@
-"""Texel memory: codes of texels, places of levels, and the words that load it."""
+"""Texel memory: codes of texels, places of levels, and the writes that load it."""
 
 from dataclasses import replace
 from itertools import pairwise, product
@@ -13,7 +13,7 @@ MEMORY = TexelMemory()
 
 
 def test_codes_are_the_nearest():
-    """At most half a step off, and 0.1 LSB of sRGB; 0 and 1 are exact."""
+    """Codes are off by at most half a step, and by 0.1 LSB of sRGB. 0 and 1 are exact."""
     linear = np.linspace(0, 1, 200_001)
     code = TexelMemory.encode(linear)
     off = np.abs(TexelMemory.linear(code) - linear)
@@ -32,7 +32,7 @@ def test_codes_are_the_nearest():
 
 
 def test_levels_do_not_overlap():
-    """Every size: no word of a bank is in two levels, and the last ends at the number of words."""
+    """For every size no word of a bank is in two levels, and the last level ends at the number of words."""
     for width, height in product(2 ** np.arange(11), repeat=2):
         levels = int(max(width, height)).bit_length()
         places, words = levels_placed(int(width), int(height), levels)
@@ -44,7 +44,7 @@ def test_levels_do_not_overlap():
 
 
 def test_several_textures():
-    """They share gaps, keep their texels, and come once if they are given twice."""
+    """Several textures share gaps and keep their texels. A texture that is given twice is stored once."""
     rng = np.random.default_rng(3)
     sizes = ((1, 1), (64, 64), (2, 2), (8, 16), (1, 32))
     textures = [Texture(rng.random((height, width, 3))) for width, height in sizes]

@@ -17,16 +17,16 @@ WHITE = Texture(np.ones((1, 1, 3)))
 
 
 def image(rng, kind, width, height):
-    """Texels: any, a checker of full contrast, or dark ones."""
+    """Texels of an image: random, a checker of full contrast, or dark."""
     if kind == "checker":
         return np.repeat((np.indices((height, width)).sum(axis=0) % 2.0)[:, :, np.newaxis], 3, axis=2)
     return rng.random((height, width, 3)) * (1 if kind == "any" else 0.01)
 
 
 def places(rng, texture, count, share_bits=14):
-    """Levels, and coordinates in texels of them with ``share_bits`` fraction bits, over 6 images each way.
+    """Levels, and texture coordinates with ``share_bits`` fraction bits, in texels of these levels.
 
-    Every fifth is at the centre or the border of a texel.
+    They reach over 6 images each way. Every fifth is at the centre or the border of a texel.
     """
     height, width, _ = texture.texels.shape
     level = rng.integers(0, len(texture.levels), count)
@@ -37,7 +37,7 @@ def places(rng, texture, count, share_bits=14):
 
 
 def sampled(sampler, texture, codes, level):
-    """Colours of a texture that is in the memory behind another."""
+    """Colours of a texture that stands behind another texture in the memory."""
     loaded = sampler.memory.load([WHITE, texture])
     coordinates = Fixed(sampler.address.coordinate_format, codes)
     return sampler.sample(loaded, loaded.descriptors[1], coordinates, level)
@@ -46,7 +46,7 @@ def sampled(sampler, texture, codes, level):
 @pytest.mark.parametrize("filter", ["bilinear", "nearest"])
 @pytest.mark.parametrize("kind", ["any", "checker", "dark"])
 def test_error_against_the_exact_rule(kind, filter):
-    """All sizes, wraps and levels: the arithmetic and the rounding of texels, and nothing else."""
+    """With all sizes, wraps and levels, only the arithmetic and the rounding of texels make errors."""
     rng = np.random.default_rng(17)
     quantised = 2.0**-12 if kind == "any" else 2.0**-15
     for size, *wrap in product(SIZES, WRAPS, WRAPS):
@@ -58,7 +58,7 @@ def test_error_against_the_exact_rule(kind, filter):
 
 
 def test_error_of_the_arithmetic():
-    """Of texels that are codes: rounding alone, and the bound is not far above it."""
+    """If texels are codes, only the arithmetic makes errors. The bound is not far above them."""
     rng = np.random.default_rng(21)
     worst = 0
     for _ in range(20):
@@ -72,7 +72,7 @@ def test_error_of_the_arithmetic():
 
 @pytest.mark.parametrize(("wrap", "mode"), [("repeat", "wrap"), ("mirror", "symmetric"), ("clamp", "edge")])
 def test_wraps_as_padded_images(wrap, mode):
-    """Against the means of neighbours in an image that NumPy has padded."""
+    """Samples are compared with means of neighbours in an image that NumPy has padded."""
     rng = np.random.default_rng(22)
     for width, height in ((1, 1), (2, 1), (4, 2), (8, 8)):
         texels = TexelMemory.linear(rng.integers(0, 1 << TexelMemory.CHANNEL_BITS, (height, width, 3)))
@@ -103,12 +103,12 @@ def test_error_of_rounded_coordinates_in_proportion_to_contrast(share_bits):
         off = np.abs(found - texture.sample(place / 16, level)).max() - TextureFilter.ERROR - 2.0**-12
         assert off <= 2 * 2.0 ** -(share_bits + 1) * contrast * 0.95
         steps.append(off)
-    # With few bits the shares are most of the error.
+    # With few bits the rounding of shares is most of the error.
     assert share_bits > 8 or steps[0] > 2.0**-9
 
 
 def test_flat_images_are_exact():
-    """Every code, at any place: the same colour, which is the nearest to the texel; 1 is exactly 1."""
+    """With an image of a single code, every sample is the colour nearest to the texel. 1 is exactly 1."""
     rng = np.random.default_rng(19)
     code = np.arange(1 << TexelMemory.CHANNEL_BITS)
     texels = np.broadcast_to(code[:, np.newaxis, np.newaxis], (len(code), 4, 3))
@@ -124,7 +124,7 @@ def test_flat_images_are_exact():
 
 
 def test_nearest_alone_is_the_same():
-    """A sampler of ``nearest`` alone, with weights of a bit, gives the same texels."""
+    """A sampler for ``nearest`` alone, with weights of one bit, gives the same texels."""
     rng = np.random.default_rng(20)
     texture = Texture(image(rng, "any", 16, 8), ("mirror", "clamp"), "nearest")
     level, codes, _ = places(rng, texture, 500)

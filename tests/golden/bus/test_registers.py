@@ -27,7 +27,7 @@ ALL = (1 << len(ERRORS)) - 1
     ],
 )
 def test_a_one_clears_its_bit_and_none_that_there_is_not(data, strobe, left):
-    """On any byte of the register, while a frame is inside, too."""
+    """Ones may be written to any byte of the register, also while a frame is inside."""
     for place in range(0x00C, 0x00C + (4 if strobe != 15 else 1)):
         file = RegisterFile(MAP, {"errors": ALL})
         assert file.access(place, data, strobe, busy=True) == (0, "")
@@ -53,7 +53,10 @@ def test_values_past_the_end_are_refused(name, held, refused):
 
 
 def test_accesses_of_bytes():
-    """A byte is read with its word, as on a bus; it is not written, unless no bit outside it counts."""
+    """A read of a byte gives its word, as on a bus.
+
+    A write of a byte is accepted only if no bit outside the byte counts.
+    """
     file = RegisterFile(MAP, {"left": 0x123})
     for byte in range(4):
         assert file.access(0x040 + byte) == (0x123, "")

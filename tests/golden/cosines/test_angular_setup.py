@@ -19,7 +19,7 @@ ANGLES = [0, 1e-4, 1e-3, 0.01, 0.1, 1, 5, 10, 30, 45, 60, 89.9, 90, 91, 120, 150
 
 
 def operands(seed, degrees, count=2000):
-    """Codes of normals at an angle; vectors anywhere, and half of them near the span; lengths."""
+    """Codes of normals at an angle, codes of vectors, and lengths. Half of the vectors are near the span."""
     rng = np.random.default_rng(seed)
     left, right = pairs_at(rng, count, degrees)
     vector = rng.normal(size=(count, 3))
@@ -47,7 +47,7 @@ def cosines(result, pixel):
 
 
 def exact(left, right, vector, t):
-    """The formula of the docstring on the same codes."""
+    """The formula of the docstring, for the same codes."""
     sine, cosine = half_angles(left, right)
     psi, zero = 2 * np.arctan2(sine, cosine), np.zeros(len(left))
     x = np.divide(dot(left + right, vector) / ONE**2 / 2, cosine, out=zero.copy(), where=cosine > 0)
@@ -64,7 +64,7 @@ def error_of(unit, degrees, count=2000):
 
 
 def end_errors(unit, vectors, length):
-    """Errors at the first pixel against N_l.H, and at the last against N_r.H."""
+    """Errors at the first pixel against N_l.H, and at the last pixel against N_r.H."""
     *normals, vector = vectors
     result = setup(*normals, vector, length, unit)
     for normal, pixel in zip(normals, (0 * length, length - 1), strict=True):
@@ -76,14 +76,14 @@ def test_stiff_span_angles_keep_the_bound(degrees):
     error, bound = error_of(UNIT, degrees), UNIT.error(degrees)
     assert error <= bound
     assert degrees <= 20 or error > 0.2 * bound
-    # However small psi: cos gamma is N_l.H at the first pixel and N_r.H at the last.
+    # However small psi is, cos gamma is N_l.H at the first pixel and N_r.H at the last.
     *vectors, length = operands(4, degrees)
     assert all(error <= bound for error in end_errors(UNIT, vectors, length))
     for unit in BY_ARCCOS.values():
         assert error_of(unit, degrees, 500) <= unit.arccos_error(degrees)
 
 
-# The table of the docstring: 1e-4, 1, 10 and 45 degrees.
+# These are the angles in the table of the docstring: 1e-4, 1, 10 and 45 degrees.
 @pytest.mark.parametrize(
     ("unit", "stated"),
     [
@@ -101,7 +101,7 @@ def test_error_by_the_source_of_psi(unit, stated):
 
 @pytest.mark.parametrize(("degrees", "largest"), [(0.1, 6.4e-7), (90, 3.3e-5)])
 def test_stated_errors_of_the_half_chord(degrees, largest):
-    """The further figures of the docstring; the figure at 90 degrees holds up to 150."""
+    """The errors are those of the docstring. The figure for 90 degrees holds up to 150 degrees."""
     assert error_of(UNIT, degrees, 20_000) == pytest.approx(largest, rel=0.06)
     if degrees == 90:
         assert error_of(UNIT, 120, 20_000) < largest > error_of(UNIT, 150, 20_000)
@@ -110,7 +110,10 @@ def test_stated_errors_of_the_half_chord(degrees, largest):
 @pytest.mark.parametrize("degrees", [1e-4, 1, 45, 90, 150])
 @pytest.mark.parametrize("unit", [UNIT, BY_ARCCOS["refitted"]], ids=["half_chord", "arccos"])
 def test_stiff_peaks(degrees, unit):
-    """On a pixel, between two, and at an end; the highlight wholly inside the span."""
+    """The peak is on a pixel, between two pixels, and at an end.
+
+    The highlight lies wholly inside the span.
+    """
     psi, length = np.radians(degrees), np.array([17])
     bound = unit.error(degrees) if unit is UNIT else unit.arccos_error(degrees)
     pixel = np.arange(17)[:, np.newaxis]
@@ -119,14 +122,15 @@ def test_stiff_peaks(degrees, unit):
         codes = quantise(np.array([[[np.cos(a), np.sin(a), 0]] for a in (0, psi, turn)]))
         found = cosines(setup(*codes, length, unit), pixel)
         assert np.abs(found - exact(*codes, pixel / 16)).max() <= bound
-        # A code is off by under a step in each component, its length by 2^-18; see also test_each_figure.
+        # Each component of a code is off by less than a step, and its length by 2^-18; see also
+        # test_each_figure.
         ideal = np.cos(pixel / 16 * psi - turn)
         assert np.abs(found - ideal).max() <= bound + 4 * 2.0**-17 / np.cos(psi / 2)
 
 
 @pytest.mark.parametrize("degrees", [0.5, 10, 60])
 def test_peak_on_the_middle_pixel(degrees):
-    """It is 1, and lambda half of psi."""
+    """At the peak cos gamma is 1, and lambda is half of psi."""
     half, bound = np.radians(degrees) / 2, UNIT.error(degrees)
     ends = quantise(np.array([[[np.cos(a), np.sin(a), 0]] for a in (-half, half, 0)]))
     angle, phase, _, cos_beta, _ = result = setup(*ends, np.array([17]))
@@ -136,7 +140,10 @@ def test_peak_on_the_middle_pixel(degrees):
 
 
 def test_stiff_normals_of_no_unit_length():
-    """Of length 0 both N.H are 0, and so is cos gamma; by 1 +- 1/256 too long, the ends still hold."""
+    """With normals of length 0 both N.H and cos gamma are 0.
+
+    With lengths of 1 +- 1/256 the ends still have their N.H.
+    """
     zero, halfway = np.zeros((1, 3), dtype=np.int64), quantise(np.array([[0.6, 0, 0.8]]))
     for unit in (UNIT, BY_ARCCOS["refitted"]):
         result = setup(zero, zero, halfway, np.array([16]), unit)
@@ -149,20 +156,20 @@ def test_stiff_normals_of_no_unit_length():
 
 @pytest.mark.parametrize("degrees", [angle for angle in ANGLES if angle <= 150])
 def test_follows_slerp(degrees):
-    """Against the great circle through the directions of the quantised normals."""
+    """The curve is compared with the great circle through the directions of the quantised normals."""
     left, right, vector, length = operands(5, degrees)
     pixel = pixels(length)
     found = cosines(setup(left, right, vector, length), pixel)
     ends = (np.broadcast_to(normalise(codes / ONE), (9, *codes.shape)) for codes in (left, right))
     normals = interpolate("slerp", *ends, pixel / (length - 1))
-    # Either end is as long as its code, to 2^-18; half-way a wide span feels it 1/cos(psi/2) times.
+    # Each end is as long as its code, to 2^-18. In the middle of a wide span this counts 1/cos(psi/2) times.
     lengths = 2.0**-17 / np.cos(np.radians(degrees) / 2)
     assert np.abs(found - dot(normals, vector / ONE)).max() <= UNIT.error(degrees) + lengths
 
 
 @pytest.mark.parametrize("degrees", [1e-3, 1, 10, 45, 90, 150])
 def test_each_figure(degrees):
-    """psi, lambda and cos beta by the published formulas in float64, on exact vectors."""
+    """psi, lambda and cos beta are compared with the published formulas in float64, on exact vectors."""
     rng = np.random.default_rng(6)
     count, psi = 2000, np.radians(degrees)
     left, right = pairs_at(rng, count, degrees)
@@ -170,7 +177,7 @@ def test_each_figure(degrees):
     angle, phase, step, cos_beta, out_of_range = setup(*(quantise(v) for v in (left, right, vector)), length)
     to_left, to_right = dot(left, vector), dot(right, vector)
     side = (to_right - np.cos(psi) * to_left) / np.sin(psi)
-    # Codes are off by under a step in each component; sin psi turns that into an angle of the plane.
+    # Each component of a code is off by less than a step. Divided by sin psi this is an angle of the plane.
     plane = 4 * np.sqrt(3) * 2.0**-17 / np.sin(psi) + UNIT.error(degrees) / np.sin(psi / 2)
     assert np.abs(2 * np.pi * angle.values - psi).max() <= 2 * np.sqrt(3) * 2.0**-17 + 3e-5 * psi
     if degrees >= 1:
@@ -192,7 +199,10 @@ def test_stiff_equal_normals():
 
 
 def test_stiff_normals_one_step_apart():
-    """The difference of such normals may point along them; cos beta then goes past 1 and saves the ends."""
+    """The difference of normals one step apart may point along them.
+
+    Then cos beta is over 1, and the curve still meets the ends.
+    """
     left, _, vector, length = operands(8, 0)
     right = left.copy()
     rows, axis = np.arange(len(left)), np.abs(left).argmax(axis=1)
@@ -238,7 +248,7 @@ def test_with_the_highlight_cosine_unit(degrees):
 
 
 def test_constants():
-    """The gain of 22 steps of CORDIC as a sum of powers of two; tables of one block RAM each."""
+    """The gain of 22 steps of CORDIC is a sum of powers of two. Each table takes one block RAM."""
     gain = np.prod(np.sqrt(1 + 4.0 ** -np.arange(22)))
     assert sum(sign / 2.0**shift for sign, shift in UNIT.gain_terms) == pytest.approx(1 / gain, abs=2.0**-28)
     for values, changes in (UNIT.corrections, UNIT.reciprocals):

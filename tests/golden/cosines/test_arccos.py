@@ -14,7 +14,7 @@ INSIDE = np.abs(X) <= 1
 
 
 def segment_errors(error):
-    """Largest of an error by segment of abs x, over every input from -1 to 1."""
+    """Largest error in each segment of abs x, over every input from -1 to 1."""
     magnitude = np.abs(X[INSIDE])
     segment = np.minimum(np.searchsorted(SEGMENT_BOUNDS, magnitude, side="right") - 1, 4)
     return np.array([np.abs(error[INSIDE])[segment == s].max() for s in range(5)])
@@ -60,7 +60,7 @@ def test_misprint_of_the_last_segment():
     assert round(np.polynomial.polynomial.polyval(1.0, corrected), 3) == 0.084
     assert round(np.degrees(0.084), 1) == 4.8
     relative = error / np.arccos(x)
-    # From there on to 1 it stays above.
+    # From there to 1 the error stays above.
     for bound, start in ((0.002, 0.984), (0.01, 0.987)):
         assert round(x[np.flatnonzero(relative <= bound)[-1]], 3) == start
     assert relative[-1] > 10
@@ -80,7 +80,7 @@ def test_root_form(degree, relative):
 
 
 def least_relative_error(basis, target):
-    """Of the sums of the basis functions, by rows: the least largest relative error."""
+    """The least largest relative error that a sum of basis functions can have. A row is a basis function."""
     ratio = (basis / target).T
     ones = np.ones((len(target), 1))
     fit = linprog(
@@ -95,7 +95,7 @@ def least_relative_error(basis, target):
 
 @pytest.mark.parametrize(("degree", "relative"), [(1, "0.390"), (2, "0.0391"), (3, "0.0045")])
 def test_root_form_at_its_best(degree, relative):
-    """A fit of least relative error is a little better than the published figures."""
+    """A fit with the least relative error is a little better than the published figures."""
     x = np.cos(np.linspace(1e-4, np.pi / 2, 2001))
     basis = np.vander(x, degree + 1, increasing=True).T * np.sqrt(1 - x)
     percent(least_relative_error(basis, np.arccos(x)), relative)
@@ -108,7 +108,7 @@ def test_square_of_the_angle_by_the_squared_chord():
 
 
 def test_short_cosine_costs_angle():
-    """Half a step of the operand is 2.5 % of an angle of 1 degree, before the unit begins."""
+    """Half a step of the operand makes 2.5 % of an angle of 1 degree, whatever the unit does."""
     angle = np.radians(1.0)
     worst = np.arccos(np.cos(angle) - Arccos.OPERAND_FORMAT.step / 2) - angle
     percent(worst / angle, "2.5")
@@ -116,14 +116,15 @@ def test_short_cosine_costs_angle():
 
 @pytest.mark.parametrize("table", ARCCOS_TABLES)
 def test_every_operand(table):
-    """The arithmetic error within its bound, the model error as stated, together within their sum."""
+    """The arithmetic error is within its bound, the model error is as stated, and their sum bounds the total
+    error."""
     unit = Arccos(table)
     angle, outside = angle_of(table, EVERY)
     np.testing.assert_array_equal(outside, ~INSIDE)
     clamped = np.clip(X, -1, 1)
     arithmetic = segment_errors(angle.values - unit.polynomial(clamped))
     assert np.all(arithmetic <= unit.arithmetic_error)
-    # The bound is one that a word comes near to.
+    # A word comes near to the bound.
     assert np.all(arithmetic >= 0.75 * unit.arithmetic_error)
     model = segment_errors(unit.polynomial(clamped) - np.arccos(clamped))
     np.testing.assert_array_less(np.abs(model - MODEL_ERRORS[table]), HALF_DIGITS)
@@ -132,10 +133,10 @@ def test_every_operand(table):
     if table == "refitted":
         corrected = segment_errors(angle_of("corrected", EVERY)[0].values - np.arccos(clamped))
         assert np.all(total < 0.82 * corrected)
-    # Below 0 the supplement: two roundings of 2^-17.
+    # Below 0 the unit takes the supplement, with two roundings of 2^-17.
     sums = angle.values[EVERY > 0] + angle.values[EVERY < 0][:0:-1]
     assert np.abs(sums - np.pi).max() <= 2.0**-16
-    # Past 1 as at 1, and flagged.
+    # Past 1 the result is as at 1, and is flagged.
     for sign in (1, -1):
         past, outside = angle_of(table, sign * np.array([1 << 16, (1 << 16) + 1, (1 << 17) - 1]))
         assert set(past.codes) == {past.codes[0]}
@@ -145,7 +146,8 @@ def test_every_operand(table):
 @pytest.mark.parametrize("degrees", [0, 1e-4, 1, 45, 89.9, 90, 120, 180])
 @pytest.mark.parametrize("table", ARCCOS_TABLES)
 def test_stiff_angles(degrees, table):
-    """The cosine's rounding by arccos itself, the segment's model error, and the arithmetic."""
+    """The error has three parts: the cosine's rounding through arccos, the segment's model error, and the
+    arithmetic."""
     unit, psi = Arccos(table), np.radians(degrees)
     x = Fixed.round(SQ(2, 16), np.cos([psi]))
     found = unit.compute(x)[0].values
@@ -154,7 +156,7 @@ def test_stiff_angles(degrees, table):
     segments = np.minimum(np.searchsorted(SEGMENT_BOUNDS, np.abs(around), side="right") - 1, 4)
     bound = np.abs(np.arccos(around) - psi).max() + (model + unit.arithmetic_error)[segments].max()
     assert np.abs(found - psi).max() <= bound
-    # At 1 and -1, the angles of a smooth mesh, nothing of the angle is left: 1 degree is 0.0175.
+    # At 1 and -1, the angles of a smooth mesh, nothing is left of the angle; 1 degree is 0.0175.
     if degrees in (0, 180):
         assert np.abs(found - psi).max() > 0.015
 

@@ -14,13 +14,13 @@ def compute(a, b):
 
 
 def exact(a, b):
-    """``|a - b|^2 / 2`` in codes of 35 fraction bits: the sum of the squares of whole differences."""
+    """``|a - b|^2 / 2`` in codes of 35 fraction bits, as the exact sum of squared differences."""
     return ((a - b) ** 2).sum(axis=-1)
 
 
 @pytest.fixture(scope="module")
 def pairs():
-    """Unit vectors of every angle, any vectors, and the ends of the word."""
+    """Pairs of unit vectors at every angle, of any vectors, and of vectors at the ends of the word."""
     rng = np.random.default_rng(1)
     angles = np.r_[np.zeros(100), 10.0 ** rng.uniform(-5, 0, 20_000), rng.uniform(0, 180, 60_000), 180.0]
     anything = rng.integers(COMPONENT.min_code, COMPONENT.max_code, (2, 20_000, 3), endpoint=True)
@@ -29,7 +29,7 @@ def pairs():
 
 
 def is_near(a, b):
-    """Whether every component of the difference is a number of 18 bits."""
+    """Whether every component of the difference fits 18 bits."""
     return np.all((a - b >= COMPONENT.min_code) & (a - b <= COMPONENT.max_code), axis=-1)
 
 
@@ -42,7 +42,10 @@ def test_exact_where_no_component_reaches_one(pairs):
 
 
 def test_error_of_halving(pairs):
-    """``sqrt(3) 2^-17 |a - b| + 3 * 2^-35``; what is cut makes u smaller or, below 0, larger."""
+    """The bound is ``sqrt(3) 2^-17 |a - b| + 3 * 2^-35``.
+
+    Cut bits make u smaller, or larger if a difference is negative.
+    """
     far = ~is_near(*pairs)
     squares = exact(*pairs)[far]
     whole = np.minimum(squares, Chord.FORMAT.max_code).astype(float)
@@ -54,7 +57,10 @@ def test_error_of_halving(pairs):
 
 @pytest.mark.parametrize("difference", [2**17 - 1, 2**17, 2**17 + 1, 2**18 - 2])
 def test_border_of_halving(difference):
-    """The largest difference that is no number of 18 bits yet, and those next to it, of either sign."""
+    """The border is the largest difference that fits 18 bits.
+
+    It is tried with its neighbours and both signs.
+    """
     a, b = np.array([[ONE, 0, 0]]), np.array([[ONE - difference, 0, 0]])
     assert compute(a, b).codes[0] == (difference & ~1 if difference > ONE else difference) ** 2
     low = difference if difference <= 2**17 else difference + 1 & ~1
@@ -62,14 +68,14 @@ def test_border_of_halving(difference):
 
 
 def test_extremes_saturate():
-    """Opposite corners of the cube are 12 apart in the square: u is 6, and the word ends at 4."""
+    """Opposite corners of the cube have a squared distance of 12, so u is 6. The word ends at 4."""
     corner = np.full((1, 3), COMPONENT.min_code)
     assert compute(corner, -corner - 1).codes[0] == Chord.FORMAT.max_code
 
 
 @pytest.mark.parametrize("stretch", [-1 / 256, -1e-4, 0.0, 1e-4, 1 / 256])
 def test_length_is_felt_at_second_order(stretch):
-    """A length error e gives ``e^2/2 + e u``; the dot product is wrong by e.
+    """A length error e gives ``e^2/2 + e u``, while the dot product is off by e.
 
     Rounding moves each vector by up to half a diagonal of its grid.
     """

@@ -16,7 +16,7 @@ SCALE = (ONE / 2**17) ** 2
 
 
 def setup(diffuse, highlight, length, parameters=P):
-    """Of codes, shape (spans, 3) or (spans, lights, 3)."""
+    """Run the setup for codes of shape (spans, 3) or (spans, lights, 3)."""
     diffuse, highlight = (np.reshape(v, (len(v), -1, 3)) for v in (diffuse, highlight))
     return parameters.compute(Fixed(P.DIFFUSE_FORMAT, diffuse), Fixed(P.HIGHLIGHT_FORMAT, highlight), length)
 
@@ -47,7 +47,10 @@ def two_curves(rng, count, size):
 @pytest.mark.parametrize("size", [1e-4, 1e-2, 0.1, 1.0])
 @pytest.mark.parametrize("length", [1, 2, 3, 16, 4095, None])
 def test_error(size, length):
-    """At random pixels and the last: within the bounds, and not far from them where lengths are random."""
+    """Errors at random pixels and at the last pixel are within the bounds.
+
+    Where lengths are random, they come near the bounds.
+    """
     rng, count = np.random.default_rng(int(1e4 * size)), 10_000
     both, codes = two_curves(rng, count, size)
     length = rng.integers(2, 4096, count) if length is None else np.full(count, length)
@@ -65,7 +68,7 @@ def test_error(size, length):
 
 @pytest.mark.parametrize("length", [1, 2, 3, 16, 4095])
 def test_stiff_equal_values_stay(length):
-    """No difference at all, at the ends of the ranges, too."""
+    """Equal values give no difference at all, also at the ends of the ranges."""
     rng = np.random.default_rng(length)
     codes = [value[:, 0, :1].repeat(3, axis=1) for value in any_values(rng, 500, 1)]
     for value, format in zip(codes, FORMATS, strict=True):
@@ -80,7 +83,8 @@ def test_stiff_equal_values_stay(length):
 
 @pytest.mark.parametrize("length", [2, 3, 5, 9, 17, 4097 // 2 + 1])
 def test_stiff_values_are_met(length):
-    """Where dt is a power of two nothing but G, for f also P, is rounded: 2^-23 in the middle, 2^-19."""
+    """If dt is a power of two, only G (for f also P) is rounded: the error is 2^-23 in the middle, and
+    2^-19."""
     _, codes = two_curves(np.random.default_rng(length), 2000, 0.9)
     diffuse, highlight, _ = setup(*codes, np.full(2000, length))
     drift = 2.0**-46 * (length + length**2 / 2)
@@ -94,24 +98,25 @@ def test_stiff_values_are_met(length):
 
 
 def test_flag():
-    """Exactly where a rounded word leaves its format."""
+    """The flag is set exactly if a rounded word leaves its format."""
     count = 20_001
     offset = np.arange(count) - count // 2
     zero, length = np.zeros((count, 3), dtype=np.int64), np.full(count, 5)
     half = 1 << 25
 
-    # u: P of 26 fraction bits with its end at about 1/2; v_m in the middle, so that G is 0 or half a step.
+    # For u: P has 26 fraction bits, and its format ends at about 1/2. v_m is in the middle, so G is 0 or half
+    # a step.
     end = half + offset
     highlight = np.stack([0 * end, end >> 1, end], axis=1)
     curvature = (2 * (end - 2 * (end >> 1)) / 2.0**26 * 2**20 + 0.5) // 1
     assert not curvature.any()
     _, _, out_of_range = setup(zero, highlight, length)
     np.testing.assert_array_equal(out_of_range, end >= half)
-    # The other way -1/2 itself fits.
+    # In the other direction -1/2 itself fits.
     _, _, out_of_range = setup(zero, highlight[:, ::-1], length)
     np.testing.assert_array_equal(out_of_range, end > half)
 
-    # G = 4 (v_l - v_m) with equal ends: 1/8 at v_l - v_m = 2^-5, rounded half up to 2^-20.
+    # With equal ends G = 4 (v_l - v_m). It is 1/8 at v_l - v_m = 2^-5, rounded half up to 2^-20.
     bump = (1 << 21) + offset
     for sign in (1, -1):
         highlight = np.stack([half + 0 * bump, half - sign * bump, half + 0 * bump], axis=1)
@@ -120,7 +125,7 @@ def test_flag():
         np.testing.assert_array_equal(out_of_range, (curvature >= 2**17) | (curvature < -(2**17)))
         assert 0 < np.count_nonzero(out_of_range) < count
 
-    # f: P rounded to 18 fraction bits.
+    # For f: P is rounded to 18 fraction bits.
     end = (1 << 24) + offset
     diffuse = np.stack([0 * end, end >> 1, end], axis=1)
     _, _, out_of_range = setup(diffuse, zero, length)
@@ -130,7 +135,10 @@ def test_flag():
 
 @pytest.mark.parametrize("curved", [False, True])
 def test_stiff_drift_over_4095_pixels(curved):
-    """The rounding of the differences, ``2^-46 (k + k^2/2)`` at pixel k: the worst of many."""
+    """The rounding of the differences makes ``2^-46 (k + k^2/2)`` at pixel k.
+
+    This is the worst of many spans.
+    """
     rng, p = np.random.default_rng(46 + curved), P
     count, length = 200_000, np.full(200_000, 4095)
     slopes = rng.integers(-(2**25), 2**25, (count, 1))
@@ -139,7 +147,7 @@ def test_stiff_drift_over_4095_pixels(curved):
     differences = p.differences(Fixed(p.HIGHLIGHT_FORMAT, 0 * slopes), *words, *p.steps(length))
     reciprocal, shift, square, square_shift = step_words(np.array([4095]))
     k = 4094
-    # In codes of 80 fraction bits, exact with the words of dt and dt^2.
+    # Computed in codes of 80 fraction bits, which are exact for the words of dt and dt^2.
     slope_term = slopes[:, 0].astype(object) * int(reciprocal.codes[0]) << 38 - int(shift[0])
     curvature_term = curvatures[:, 0].astype(object) * int(square.codes[0]) << 45 - int(square_shift[0])
     exact = k * slope_term + k**2 * curvature_term
@@ -152,7 +160,10 @@ def test_stiff_drift_over_4095_pixels(curved):
 
 @pytest.mark.parametrize("fraction_bits", [36, 40])
 def test_fewer_bits_keep_the_bounds(fraction_bits):
-    """Those of a span as long as they allow; the bounds are hardly larger than in full."""
+    """Fewer fraction bits keep the bounds in spans of the length that they allow.
+
+    The bounds are hardly larger than with all bits.
+    """
     rng, p = np.random.default_rng(fraction_bits), ChordSetup(fraction_bits)
     assert p.longest == {36: 127, 40: 511}[fraction_bits]
     for length in (2, 3, p.longest):
@@ -204,7 +215,7 @@ def test_refuses():
 
 
 def test_quantise():
-    """Nearest codes in units of ONE_SQUARED; the ends of the ranges fit."""
+    """Codes are the nearest, in units of ONE_SQUARED. The ends of the ranges fit."""
     values = SpanValues.quantise(np.array([[[-1.0, 0.0, 1.0]]]), np.array([[[0.0, 1.0, 2.0]]]))
     one = (2**17 - 1) ** 2 / 2**34
     assert values.diffuse.tolist() == [[[-round(one * 2**25), 0, round(one * 2**25)]]]

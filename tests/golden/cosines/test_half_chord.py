@@ -34,11 +34,11 @@ def test_stiff_angles_of_normals(degrees):
     left, right = code_pairs_at(np.random.default_rng(8), 1500, degrees)
     angle = 360 * UNIT.compute(*chord_of(left, right)).values
     exact = degrees_between(left, right)[:, 0]
-    # A length is off by 2^-18 at most, a chord of normals of unequal length by their difference.
+    # A length is off by at most 2^-18, and a chord between normals of unequal length by their difference.
     lengths = np.abs(np.linalg.norm(left, axis=1) - np.linalg.norm(right, axis=1)) / 2.0**17
     bound = UNIT.RELATIVE_ERROR * np.minimum(exact, 180 - exact) + np.degrees(2 * lengths + 2.0**-17)
     assert np.all(np.abs(angle - exact) <= bound)
-    # The quantised normals themselves are off by under sqrt 3 steps each.
+    # Each quantised normal is off by less than sqrt 3 steps.
     assert np.abs(angle - degrees).max() <= np.degrees(2 * np.sqrt(3) * 2.0**-17) + bound.max()
 
 

@@ -14,7 +14,7 @@ TURN = 1 << 40
 
 
 def values(phase, cos_beta, unit=UNIT, step=0, length=1):
-    """Result of spans of one length, shape (spans, length)."""
+    """Results of spans of one length, shape (spans, length)."""
     phase = np.atleast_1d(phase)
     count = len(phase)
     result = unit.compute(
@@ -33,9 +33,12 @@ def exact(phase, cos_beta):
 
 
 def assert_errors_under_bounds(phase, cos_beta):
-    """Near the peak and anywhere; gives the shares of the bounds that the errors reach."""
+    """Check errors near the peak and elsewhere.
+
+    The result has the shares of the bounds that the errors reach.
+    """
     error = np.abs(values(phase, cos_beta)[:, 0] - exact(phase, cos_beta))
-    # The last step before 1/32 may round to either side.
+    # The last step before 1/32 may be rounded to either side.
     near = 1 - np.abs(np.cos(2 * np.pi * phase / TURN)) < 1 / 32 - 2.0**-20
     assert error[near].max() <= UNIT.NEAR_ERROR
     assert error.max() <= UNIT.ERROR
@@ -46,7 +49,7 @@ def assert_errors_under_bounds(phase, cos_beta):
     "cos_beta", [0.999, *(pytest.param(share, marks=pytest.mark.long) for share in (1.0, 0.5, 0.0))]
 )
 def test_arithmetic_error_over_every_angle(cos_beta):
-    # Every value of the bits that the unit looks at, with the bits below them at their middle.
+    # All values of the bits that the unit reads, with the lower bits at the middle of their range.
     phase = (np.arange(-(1 << 20), 1 << 20) << 19) + (1 << 18)
     shares = assert_errors_under_bounds(phase, int(cos_beta * 2**25))
     assert cos_beta != 0.999 or min(shares) > 0.5
@@ -66,7 +69,7 @@ def test_gain_of_interpolation():
         np.abs(values(phase, 1 << 25, HighlightCosine(interpolated=on))[:, 0] - exact(phase, 1 << 25)).max()
         for on in (False, True)
     )
-    # Half a step where the wave is steepest, and the multiplier's rounding.
+    # Half a step where the wave is steepest, plus the multiplier's rounding.
     assert 0.97 * width / 2 < drawn < width / 2 + UNIT.ERROR
     assert interpolated < drawn / 100
 
@@ -93,7 +96,10 @@ def test_table_fits_one_block_ram():
 @pytest.mark.parametrize("position", [-0.7, 0.0, 0.3, 0.5, 1.0, 1.6])
 @pytest.mark.parametrize("length", [2, 3, 37, 4095])
 def test_stiff_spans_follow_the_great_circle(degrees, position, length):
-    """Against slerp of the normals; the highlight inside the span, at its ends and outside."""
+    """Spans are compared with slerp of the normals.
+
+    The highlight is inside the span, at its ends, and outside.
+    """
     psi = np.radians(degrees)
     left, right = np.array([1.0, 0, 0]), np.array([np.cos(psi), np.sin(psi), 0])
     beta, phase = 0.3, position * psi
@@ -106,13 +112,13 @@ def test_stiff_spans_follow_the_great_circle(degrees, position, length):
         length=length,
     )[0]
     normals = interpolate("slerp", left, right, np.arange(length) / (length - 1))
-    # Cutting the step adds under 2^-40 turns a pixel, cutting cos beta 2^-25.
+    # The cut of the step adds less than 2^-40 turns a pixel, and the cut of cos beta 2^-25.
     bound = UNIT.ERROR + 2.0**-25 + 2 * np.pi * (length - 1) * 2.0**-40 + 1e-9
     assert np.abs(found - (1 - normals @ halfway)).max() <= bound
 
 
 def test_stiff_opposite_normals():
-    """Half a turn by the pole: slerp has no plane, the accumulator goes on."""
+    """Half a turn past the pole has no plane for slerp; the accumulator goes on."""
     length = 4095
     step = round(TURN / 2 / (length - 1))
     found = values(TURN // 4, 1 << 25, step=step, length=length)[0]
@@ -121,7 +127,7 @@ def test_stiff_opposite_normals():
 
 
 def test_stiff_peak_narrower_than_a_pixel():
-    """Over 4 pixels of 179 degrees the peak between the middle two is seen by neither."""
+    """In 4 pixels of 179 degrees the peak lies between the two middle pixels, and neither shows it."""
     step = round(179 / 360 / 3 * TURN)
     found = values(step + step // 2, 1 << 25, step=step, length=4)[0]
     target = 1 - np.cos(2 * np.pi * step / TURN * np.array([1.5, 0.5, 0.5, 1.5]))
@@ -134,7 +140,8 @@ def test_stiff_peak_on_a_pixel_is_exact_and_between_pixels_even():
     for cos_beta in (1 << 25, 30000001, 12345):
         found = values(7 * step, cos_beta, step=step, length=15)[0]
         assert found[7] == found.min() == 1 - cos_beta / 2.0**25
-        # Inverted bits may put the two sides of the wave a step of the table's fraction apart.
+        # Bits are inverted on one side of the wave, so both sides may differ by a step of the table's
+        # fraction.
         assert found[:7] == pytest.approx(found[:7:-1], abs=2.0**-21)
     step = 1 << 30
     found = values(7 * step + step // 2, 1 << 25, step=step, length=16)[0]
@@ -148,12 +155,12 @@ def test_stiff_equal_normals_give_one_value():
 
 
 def test_stiff_drift_over_the_longest_span():
-    """The sum is exact; the step's rounding alone adds up, to 4094 halves of 2^-40 turns."""
+    """The sum is exact. Only the rounding of the step adds up, to 4094 halves of 2^-40 turns."""
     worst = 0
     for degrees in (60, 90, 179.99, 0.001):
         turns = Fraction(degrees) / 360
         step = round(turns / 4094 * TURN)
-        # Where the circle is steepest against H, a quarter turn from it.
+        # The circle is steepest against H a quarter turn from it.
         phase = TURN // 4 + 4094 * step
         phase = (phase + TURN // 2) % TURN - TURN // 2
         last = values(phase, 1 << 25, step=step, length=4095)[0, -1]
@@ -166,7 +173,7 @@ def test_stiff_drift_over_the_longest_span():
 
 
 def test_stiff_overlong_cos_beta():
-    """Up to sqrt 2, which normals that differ by their rounding alone can give, nothing wraps."""
+    """cos beta up to sqrt 2, as normals that differ only by rounding can give, makes no word wrap."""
     phase = np.arange(-(1 << 15), 1 << 15) << 24
     code = int(np.sqrt(2) * 2**25)
     target = np.clip(1 - np.sqrt(2) * np.cos(2 * np.pi * phase / TURN), 0, 2)

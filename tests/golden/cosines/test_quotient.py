@@ -10,7 +10,7 @@ from blysk.golden.number.fixed import Fixed
 
 
 def test_root_is_within_its_bound_at_every_word():
-    """Every word of q shifted, 21 bits, against float64; and some words of every shift."""
+    """Every shifted word of q, 21 bits, is compared with float64, and some words of every shift."""
     unit = Quotient()
     for shift in range(8):
         normal = np.arange(1 << 19, 1 << 21, 41 if shift else 1)
@@ -35,7 +35,7 @@ def _pixels(spans, m, w, line):
 
 @pytest.mark.parametrize("mirror", [False, True])
 def test_quotients_against_float64(mirror):
-    """N·L and s, by way of the place's own row and step, are within the stated errors."""
+    """N·L and s are within the stated errors. s is found from the row and step of the place."""
     rng = np.random.default_rng(5)
     count, unit = 200_000, Quotient(QuotientSpans(mirror=mirror))
     square = 4.0 ** rng.uniform(-3, 0, count)
@@ -65,7 +65,7 @@ def test_quotients_against_float64(mirror):
 
 
 def test_a_negative_numerator_is_the_peak():
-    """m may drift below 0 just at the peak: s is then 0."""
+    """At the peak m may drift below 0. Then s is 0."""
     unit = Quotient()
     _, place, _ = unit.compute(_pixels(unit.spans, np.array([-(2.0**-33)]), np.array([0.5]), np.zeros(1)))
     assert place.codes.tolist() == [[0]]

@@ -1,4 +1,4 @@
-"""Spans of the quotient method: drift against exact integers and float64, words that do not fit."""
+"""Spans of the quotient method: drift against exact integers and float64, and refusals."""
 
 from fractions import Fraction
 
@@ -20,7 +20,7 @@ def _vectors(rng, components, length):
 @pytest.mark.parametrize("lights", [1, 2])
 @pytest.mark.parametrize(("highlights", "mirror"), [(True, False), (True, True), (False, False)])
 def test_words_against_exact_fractions(lights, highlights, mirror):
-    """m, w, l and the sign of z of the codes' own line, within the stated drift, in exact arithmetic."""
+    """m, w, l and the sign of z follow the line of the codes within the stated drift, in exact arithmetic."""
     rng = np.random.default_rng(3)
     model = QuotientSpans(lights, highlights, mirror)
     names = {name: place for place, name in enumerate(model.components)}
@@ -52,7 +52,7 @@ def test_words_against_exact_fractions(lights, highlights, mirror):
 
 
 def test_vectors_against_float64():
-    """Components along a span are within the bound of `QuotientErrors`; the words are filled."""
+    """Components along a span are within the bound of `QuotientErrors`. Their words are filled."""
     rng = np.random.default_rng(4)
     length = np.repeat(LENGTHS, 300)
     left, right = _vectors(rng, 3, length)
@@ -77,14 +77,14 @@ def test_vectors_against_float64():
 
 @pytest.mark.parametrize("mirror", [False, True])
 def test_no_word_wraps_at_the_last_pixel(mirror):
-    """Ends whose components are near 1, with a step that is rounded up: z is over 0 and no square wraps."""
+    """The ends have components near 1, and the step is rounded up. z stays over 0, and no square wraps."""
     rng = np.random.default_rng(6)
     length = rng.integers(3, 40, 20_000)
     model = QuotientSpans(mirror=mirror)
     near, wide = (len(model.components), 1 - 10.0 ** rng.uniform(-6, -4, (len(length), 1)))
     right = np.where(rng.random((len(length), near)) < 0.5, wide, wide**2)
     left = right - rng.uniform(0, 2, right.shape)
-    # One of them as it was found: unit normals, the last 0.3 degrees from H.
+    # One of the spans was found by search: unit normals, the last of them 0.3 degrees from H.
     left[0, :3], right[0, :3] = (-0.3084362, 0.869724, 0.38528857), (-0.00258714, -0.00318275, 0.99999159)
     left[0, 3:] = right[0, 3:] = 0
     length[0] = 4

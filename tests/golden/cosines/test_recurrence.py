@@ -11,11 +11,11 @@ INTERLEAVES = (1, 4)
 LARGEST = 1 - 2.0**-16
 """Amplitude of two equal unit vectors."""
 PEAKS = np.linspace(-1, 2, 31)
-"""Positions of the highlight, in spans from the left end."""
+"""Positions of the highlight, in lengths of the span from its left end."""
 
 
 def run(recurrence, length, angle, phase, amplitude):
-    """States and results of spans of one length, with the exact cosines; all in shape (pixels, spans)."""
+    """States and results of spans of one length, and the exact cosines; each of shape (pixels, spans)."""
     angle, phase, amplitude = np.broadcast_arrays(angle, phase, amplitude)
     step = angle / max(length - 1, 1)
     coefficient, shift = recurrence.coefficient(step)
@@ -26,7 +26,7 @@ def run(recurrence, length, angle, phase, amplitude):
 
 
 def worst_state(recurrence, length, degrees, peak):
-    """Largest error of the state itself; the peak lies at this part of the span."""
+    """Largest error of the state itself. ``peak`` is the position of the peak in lengths of the span."""
     angle = np.radians(degrees)
     states, _, exact = run(recurrence, length, angle, np.atleast_1d(peak) * angle, 1.0)
     half = 2.0 ** -(recurrence.fraction_bits + 1) if recurrence.form == "reinsch" else 0
@@ -38,7 +38,7 @@ def worst_state(recurrence, length, degrees, peak):
     [(64, 10, 16, 0.015), (256, 60, 16, 0.40), (4095, 60, 24, 0.40), (4095, 60, 32, 1.5e-3)],
 )
 def test_published_errors_of_the_direct_form(length, degrees, fraction_bits, published):
-    # The position of the peak is not published; this one gives all four figures.
+    # The position of the peak is not published. This position gives all four published figures.
     error = worst_state(Recurrence("direct", fraction_bits), length, degrees, 0.79)
     half_digit = 0.05 * 10.0 ** np.floor(np.log10(published))
     assert error == pytest.approx(published, abs=half_digit)
@@ -60,7 +60,7 @@ def test_shortcut_cosine():
 
 
 def assert_keeps_the_bound(recurrence, length, angle, phase, amplitude=LARGEST):
-    """Every result within `Recurrence.error`; gives the largest error."""
+    """Check that every result is within `Recurrence.error`. The result is the largest error."""
     _, results, exact = run(recurrence, length, angle, phase, amplitude)
     worst = np.abs(results - exact).max()
     assert worst <= recurrence.error(length, angle)
@@ -70,7 +70,10 @@ def assert_keeps_the_bound(recurrence, length, angle, phase, amplitude=LARGEST):
 @pytest.mark.parametrize("degrees", [0, 1e-4, 1, 45, 60, 89.9, 90])
 @pytest.mark.parametrize("length", [1, 2, 3, 4, 5, 8, 9, 16, 257, 4095])
 def test_stiff_spans_keep_the_bound(length, degrees):
-    """The peak on a pixel, between two, inside and outside the span; every length and angle."""
+    """Spans of every length and angle keep the bound.
+
+    The peak is on a pixel, between two, inside and outside the span.
+    """
     rng = np.random.default_rng(length)
     angle = np.radians(degrees) if length > 1 else 0.0
     peaks = np.r_[0, 0.5, 1, 0.5 + 0.5 / max(length - 1, 1), rng.uniform(-1, 2, 20)]
@@ -84,7 +87,7 @@ def test_stiff_spans_keep_the_bound(length, degrees):
 @pytest.mark.parametrize("length", [16, 4095])
 @pytest.mark.parametrize("interleave", INTERLEAVES)
 def test_stiff_wide_spans_keep_the_bound(length, degrees, interleave):
-    """The recurrence knows no span angle: past 90 degrees it goes on."""
+    """The recurrence also works for angles over 90 degrees."""
     angle = np.radians(degrees)
     assert_keeps_the_bound(Recurrence(interleave=interleave), length, angle, PEAKS * angle)
 
@@ -92,7 +95,10 @@ def test_stiff_wide_spans_keep_the_bound(length, degrees, interleave):
 @pytest.mark.parametrize("interleave", INTERLEAVES)
 @pytest.mark.parametrize("degrees", [1, 45, 90])
 def test_stiff_peaks(interleave, degrees):
-    """On a pixel: the value that A rounds to; half-way between two: equal neighbours, both under it."""
+    """A peak on a pixel has the value to which A is rounded.
+
+    A peak half-way between two pixels gives equal neighbours under it.
+    """
     recurrence, step = Recurrence(interleave=interleave), np.radians(degrees) / 32
     bound = recurrence.error(33, 32 * step)
     _, found, _ = run(recurrence, 33, 32 * step, np.array([16, 15.5]) * step, LARGEST)
@@ -102,7 +108,7 @@ def test_stiff_peaks(interleave, degrees):
 
 
 def worst_words(recurrence, length, low, high):
-    """Span angles in a range whose coefficient is rounded the most, up and down."""
+    """The span angles in a range whose coefficient is rounded most, up and down."""
     angles = np.radians(np.linspace(low, high, 20001))
     step = angles / (length - 1)
     coefficient, shift = recurrence.coefficient(step)
@@ -116,14 +122,16 @@ def worst_words(recurrence, length, low, high):
 @pytest.mark.parametrize("interleave", INTERLEAVES)
 def test_stiff_drift_over_4095_pixels(degrees, interleave):
     recurrence = Recurrence(interleave=interleave)
-    # The worst rounding of K, with every x of one sign, so that all errors add up; and the peak elsewhere.
+    # The worst rounding of K, with all x of one sign, so that all errors add up; and other positions of the
+    # peak.
     angles = np.repeat(worst_words(recurrence, 4095, 0.7 * degrees, degrees), 3)
     phase = angles * np.tile([0.5, 0, 1], len(angles) // 3)
     states, results, exact = run(recurrence, 4095, angles, phase, LARGEST)
     bound = recurrence.error(4095, np.radians(degrees))
     assert np.abs(results - exact).max() <= bound
-    # The state has no last rounding. The operand's roundings do not all have one sign, and sin(j d)/sin d is
-    # under j, the more so the wider the span; a bound over four times the worst constructed would say little.
+    # The state has no last rounding. The operand's roundings do not all have the same sign, and sin(j d)/sin
+    # d is under j, most of all in wide spans. A bound of more than four times the worst constructed error
+    # would say little.
     drift = np.abs(states.values - 2.0**-17 - exact).max()
     assert (bound - 2.0**-18) / 4 < drift <= bound - 2.0**-18
     if degrees == 45:
@@ -136,7 +144,7 @@ def test_cut_alone_drifts_as_stated(interleave, stated):
     recurrence = Recurrence(interleave=interleave)
     format, shape = recurrence.state_format, (1, 4)[: 1 + interleave // 4]
     first, second = Fixed.round(format, np.full(shape, LARGEST)), Fixed(format, np.zeros(shape, int))
-    # K 2^(2-s) x is just under one step of the state: all of it is cut, on every pixel.
+    # K 2^(2-s) x is just under one step of the state, so all of it is cut at every pixel.
     largest, shift = recurrence.coefficient_format.max_code, np.array([46])
     coefficient = Fixed(recurrence.coefficient_format, np.array([largest]))
     states = recurrence.states(first, second, coefficient, shift, 4095)
@@ -155,7 +163,10 @@ def test_cut_alone_drifts_as_stated(interleave, stated):
     ],
 )
 def test_direct_form_is_unstable(interleave, spans, largest, drift):
-    """Interleaved its error is that of a quarter of the steps; in long spans no bound holds for either."""
+    """Interleaved, the error is that of a quarter of the steps.
+
+    In long spans neither form has a useful bound.
+    """
     recurrence, plain = Recurrence("direct", interleave=interleave), Recurrence("direct")
     peaks = np.linspace(0, 1, 21)
     for length, degrees in spans:
@@ -165,7 +176,7 @@ def test_direct_form_is_unstable(interleave, spans, largest, drift):
         assert bound < largest
         limit = plain.error(length, angle)
         assert interleave == 1 or bound < limit / 4 or limit == 3
-    # Beyond, no bound but that of its words, and the error says why.
+    # Beyond, only the range of the words bounds the error.
     angle = np.radians(45)
     assert recurrence.error(4095, angle) == 3
     assert assert_keeps_the_bound(recurrence, 4095, angle, peaks * angle) > drift
@@ -174,7 +185,10 @@ def test_direct_form_is_unstable(interleave, spans, largest, drift):
 @pytest.mark.parametrize("degrees", [0, 1e-4, 1, 45, 89.9, 90])
 @pytest.mark.parametrize("length", [1, 2, 3, 5, 8, 9, 16, 257, 4095])
 def test_prologue_keeps_its_bound(length, degrees):
-    """Start values of the phases by seven steps of the recurrence, and the span that follows from them."""
+    """Seven steps of the recurrence give the start values of the phases.
+
+    The span that follows keeps its bound.
+    """
     rng = np.random.default_rng(length)
     single, interleaved = Recurrence(), Recurrence(interleave=4)
     angle = np.radians(degrees) if length > 1 else 0.0
@@ -186,7 +200,7 @@ def test_prologue_keeps_its_bound(length, degrees):
     exact = LARGEST * np.cos(phase - step * np.arange(length)[:, np.newaxis])
     added = interleaved.prologue_error(length, angle)
     assert np.abs(interleaved.result(states).values - exact).max() <= interleaved.error(length, angle) + added
-    # It grows with the angle alone: 4.5 psi^2/m 2^-F, never as much as psi^2/2 2^-F of the recurrence.
+    # The error grows only with the angle, as 4.5 psi^2/m 2^-F, and stays below the recurrence's psi^2/2 2^-F.
     if length >= 16:
         assert added < 0.9 * interleaved.error(length, angle)
     if length == 4095:
@@ -203,7 +217,7 @@ def test_prologue_gives_what_start_gives():
 
 
 def test_start_values_from_short_sines():
-    """A difference as a small number times a sine of 17 bits costs psi times the sine's error."""
+    """If a difference is a small number times a sine of 17 bits, it costs psi times the error of the sine."""
     recurrence, length, angle = Recurrence(interleave=4), 4095, np.radians(60)
     step = np.full(100, angle / 4094)
     phase = np.linspace(-1, 2, 100) * angle
@@ -259,7 +273,8 @@ def test_stiff_words_at_their_ends():
 
 
 def test_stiff_steps_past_those_of_an_interleaved_span():
-    """Up to 4 pixels of up to 90 degrees: the coefficient of 90 degrees, which nothing reads."""
+    """In spans of up to 4 pixels of up to 90 degrees the coefficient is that of 90 degrees, and nothing reads
+    it."""
     recurrence = Recurrence(interleave=4)
     for length in (2, 3, 4):
         angle = np.radians(90)
@@ -275,7 +290,10 @@ def test_stiff_steps_past_those_of_an_interleaved_span():
 @pytest.mark.parametrize("form", RECURRENCE_FORMS)
 @pytest.mark.parametrize(("length", "degrees"), [(1, 0), (3, 1), (64, 1), (64, 10), (1000, 1)])
 def test_result_of_more_bits(form, length, degrees):
-    """The bound without the last rounding holds; in the stable form it says more than that of 17 bits."""
+    """Without the last rounding the bound still holds.
+
+    In the stable form it is then smaller than that of 17 bits.
+    """
     short, long = (Recurrence(form, result_format=format) for format in (SQ(1, 17), SQ(2, 25)))
     angle = np.radians(degrees)
     assert_keeps_the_bound(long, length, angle, PEAKS * angle)

@@ -43,7 +43,7 @@ def error_of(setup, spans, length):
 
 
 def make_spans(rng, count, degrees):
-    """Spans, and vectors of which half lie near them, so that the peak is inside."""
+    """Spans and vectors. Half of the vectors are near the spans, so that the peak is inside."""
     left, right = pairs_at(rng, count, degrees)
     vector = sphere(rng, count)
     near = slice(0, count // 2)
@@ -61,7 +61,10 @@ def test_stiff_spans_keep_the_bound(length, degrees):
 
 @pytest.mark.parametrize(("degrees", "stated"), [(0, 0.016), (1, 0.3), (10, 2.7), (45, 12), (90, 25)])
 def test_largest_errors_are_as_stated(degrees, stated):
-    """In units of 1e-6; and the bound is no more than 7.5 times the error of many spans."""
+    """Errors are as stated, in units of 1e-6.
+
+    The bound is at most 7.5 times the largest error of many spans.
+    """
     rng, lengths = np.random.default_rng(1), (2, 3, 4, 5, 9, 16, 17, 33, 100, 1000)
     worst = max(error_of(SETUP, make_spans(rng, 2000, degrees), length) for length in lengths)
     assert stated * 0.75e-6 <= worst <= stated * 1e-6
@@ -75,7 +78,7 @@ def test_curve_is_slerp():
     t = np.linspace(0, 1, 50)[:, np.newaxis]
     normals = interpolate("slerp", values(left), values(right), t)
     exact = dot(normals, values(vector))
-    # The codes are not quite of unit length, and the curve follows that of either end.
+    # The codes do not have exactly unit length, and at each end the curve follows the length of the end.
     assert np.abs(curve(left, right, vector, 50) - exact).max() < 2e-5
 
 
@@ -89,7 +92,8 @@ def test_stiff_equal_normals_stay_to_the_bit(length):
 
 @pytest.mark.parametrize("length", [2, 16, 4095])
 def test_stiff_normals_a_step_apart(length):
-    """The chord is of a few codes, its direction arbitrary, and its length along H far from a sine."""
+    """The chord is a few codes long, so its direction is arbitrary, and its length along H is far from a
+    sine."""
     rng = np.random.default_rng(4)
     left, _, vector = make_spans(rng, 400, 0)
     right = np.clip(left + rng.integers(-1, 2, left.shape), -ONE, ONE)
@@ -99,15 +103,15 @@ def test_stiff_normals_a_step_apart(length):
 @pytest.mark.parametrize("degrees", [1, 20, 90])
 @pytest.mark.parametrize(("length", "at"), [(17, 0), (17, 0.5), (17, 1), (16, 0.5)])
 def test_stiff_peaks(degrees, length, at):
-    """On a pixel, the first, the middle and the last one; and between two."""
+    """The peak is on the first, the middle or the last pixel, or between two pixels."""
     left, right = pairs_at(np.random.default_rng(5), 200, degrees)
     codes = [quantise(v) for v in (left, right, interpolate("slerp", left, right, np.full(200, at)))]
     bound = SETUP.error(length, np.radians(degrees))
     found = SETUP.recurrence.result(states_of(SETUP, *codes, length)[0]).values
     assert np.abs(found - curve(*codes, length)).max() <= bound
     peak = np.cos(np.radians(degrees) / (length - 1) / 2) if length == 16 else 1
-    # The codes lie off the great circle by under 2^-17 each, which the cosine feels at second order,
-    # and are of unit length to within 2^-18 or so.
+    # The codes lie within 2^-17 of the great circle, which changes the cosine at second order. They have unit
+    # length to about 2^-18.
     assert np.abs(found.max(axis=0) - peak).max() <= bound + 2.0**-17
 
 
@@ -121,9 +125,10 @@ def test_spans_out_of_range_are_flagged(degrees, flagged):
 
 @pytest.mark.parametrize("length", [2, 3, 5, 16, 2049, 4095])
 def test_stiff_words_at_their_ends(length):
-    """Codes of any size, lengths 0 to sqrt 3: the flag and x(0) are exact, the angle follows the chord.
+    """With codes of any size, lengths 0 to sqrt 3, the flag and x(0) are exact, and the angle follows the
+    chord.
 
-    x(0) is N_l.H, saturated at -2 and 2. Whatever the lengths, K is that of an isosceles triangle with the
+    x(0) is N_l.H, saturated at -2 and 2. Whatever the lengths, K belongs to an isosceles triangle with the
     chord of the span, within the relative error that `RecurrenceSetup.error` counts.
     """
     rng = np.random.default_rng(7)
@@ -149,7 +154,10 @@ def test_stiff_words_at_their_ends(length):
 
 
 def test_tables():
-    """Lines between the words of each table: the words' rounding and the fit together in their bound."""
+    """The values between the words of each table are within their bound.
+
+    It counts the rounding of the words and the fit.
+    """
 
     def assert_lines(tables, x, words, functions):
         for (table, changes), exact in zip(tables, functions, strict=True):
@@ -166,7 +174,7 @@ def test_tables():
 
 
 def test_reciprocals():
-    """Of every length: a relative 2^-17, and the square as exact."""
+    """Reciprocals of every length are within a relative 2^-17, and squares are as exact."""
     steps = np.arange(1, 4095)
     address, shift = reciprocal_address(steps)
     reciprocal, square, small = (word[address] for word in SETUP.reciprocals)
@@ -178,11 +186,12 @@ def test_reciprocals():
 @pytest.mark.parametrize("degrees", [1, 20, 90])
 @pytest.mark.parametrize("length", [1, 3, 5, 16, 64])
 def test_direct_form(length, degrees):
-    """Start values and coefficient as from `Recurrence.start`, so its own error bound holds."""
+    """Start values and coefficient are as exact as those of `Recurrence.start`, so the error bound of the
+    recurrence holds."""
     setup, angle = RecurrenceSetup(Recurrence("direct", interleave=4)), np.radians(degrees)
     error = error_of(setup, make_spans(np.random.default_rng(8), 300, degrees), length)
     own = SETUP.error(length, angle)
-    # An error of a start value comes back as often as steps follow it; that of the coefficient is 2^-16.
+    # An error of a start value counts once for each step. The error of the coefficient is 2^-16.
     steps = np.ceil(length / 4)
     assert error <= setup.recurrence.error(length, angle) + own * (1 + 2 * steps)
 

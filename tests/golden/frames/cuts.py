@@ -1,4 +1,4 @@
-"""What the tests of cut spans share."""
+"""Helpers of the tests of cut spans."""
 
 import numpy as np
 
@@ -15,9 +15,9 @@ ONE_VALUE = (ONE / 2**17) ** 2
 
 
 def raster_of(rng, left, right, length, spread=0.3):
-    """Spans of these normals and lengths anywhere on a picture; one pixel has one normal, of one length.
+    """Spans with these normals and lengths, anywhere on a picture. A span of one pixel has one normal.
 
-    Of the normals at the ends each is up to ``10^spread`` times as long, or as short, as 1.
+    Each end is up to ``10^spread`` times as long as 1, or as short.
     """
     length = np.broadcast_to(length, len(left)).astype(np.int32)
     right = np.where(length[:, np.newaxis] == 1, left, right)
@@ -54,14 +54,14 @@ def raster_of(rng, left, right, length, spread=0.3):
 
 
 def angles(raster):
-    """Degrees between the ends of each span, by the form that is exact at both ends of the scale."""
+    """Degrees between the ends of each span, by a form that is exact for small and large angles."""
     left, right = raster.normal_left, raster.normal_right
     sine = np.linalg.norm(left - right, axis=1)
     return np.degrees(2 * np.arctan2(sine, np.linalg.norm(left + right, axis=1)))
 
 
 def origins(raster, cut):
-    """The given span of each part, by its first fragment."""
+    """The given span of each part, found by the part's first fragment."""
     first = np.cumsum(cut.length) - cut.length
     return raster.span[first], raster.offset[first]
 
@@ -77,7 +77,7 @@ def material(exponent):
 
 
 def exact_operands(scene, raster):
-    """N·L and u of every fragment, each vector normalised there."""
+    """N·L and u of every fragment, with each vector normalised at the fragment."""
     span = raster.span
     t = raster.offset / np.maximum(raster.length[span] - 1, 1)
     normal = normalise(line_at(raster, span, t))

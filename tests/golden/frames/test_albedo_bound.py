@@ -29,7 +29,7 @@ CHECKER = np.repeat(np.indices((64, 64)).sum(axis=0)[..., np.newaxis] // 2 % 2, 
 
 
 def scene_of(projection, texture=None, colors=True, tiles=3.0, **looks):
-    """A floor at a grazing angle, of two materials, and a light behind it."""
+    """A floor at a grazing angle with two materials and a light behind it."""
     points = np.array([[-3.0, 0, 2], [3, 0, 2], [3, 0, -9], [-3, 0, -9]])
     normals = normalise(points * (0.1, 0, 0.05) + (0, 1, 0.3))
     rng = np.random.default_rng(4)
@@ -59,7 +59,7 @@ CASES = {
 @pytest.mark.parametrize("projection", ["perspective", "orthographic"])
 @pytest.mark.parametrize("case", CASES)
 def test_bounds_hold(case, projection):
-    """The albedo of each pixel and the pixel itself are within their bounds, which are not idle."""
+    """The albedo of each pixel and the pixel itself are within their bounds. The bounds are not too wide."""
     texture, colors, looks = CASES[case]
     scene = scene_of(projection, texture, colors, **looks)
     design = design_for(preset("quotient", "blinn", lights=2), scene)
@@ -89,7 +89,7 @@ def test_bounds_hold(case, projection):
 
 
 def test_bounds_follow_the_slope_of_the_pixel():
-    """A dark pixel has the slope of black, and a bright pixel its own."""
+    """A dark pixel has the slope of the curve at black, and a bright pixel the slope at its own colour."""
     bound, least = np.array([0.6, 0.9]), np.array([0.0, 1.0])
     step = 1 / 128
     slopes = np.array([12.92, 1.055 / 2.4 * (1 - (0.4 + step) / 255) ** (1 / 2.4 - 1)])
@@ -114,7 +114,7 @@ def test_a_span_that_is_cut_for_two_reasons_counts_once(method):
     scene = scene_of("perspective", Texture(image, mipmapped=False), tiles=0.3)
     prepared = prepare(scene, design_for(preset(method, "blinn", lights=2), scene))
     parts = np.bincount(origins(prepared.raster, prepared.cut_raster)[0])
-    # With quotient a span of two pixels is always two parts, and counts only if its ends differ.
+    # With quotient a span of two pixels always becomes two parts. It counts as cut only if its ends differ.
     pairs = prepared.raster.length[parts > 1] == 2 if method == "quotient" else np.zeros(1)
     assert 0 <= (parts > 1).sum() - prepared.spans_cut <= pairs.sum()
     _, by_attributes = cut_by_attributes(scene, prepared.raster)
@@ -123,7 +123,7 @@ def test_a_span_that_is_cut_for_two_reasons_counts_once(method):
 
 @pytest.mark.parametrize("wraps", [("clamp", "mirror"), ("repeat", "clamp")])
 def test_cuts(wraps):
-    """Far outside of an image, and over more texels a pixel than a word holds, frames keep their bounds."""
+    """Frames keep their bounds far outside an image, and if a pixel crosses more texels than a word holds."""
     image = np.random.default_rng(5).random((512, 512, 3))
     scene = scene_of("perspective", Texture(image, wraps, mipmapped=False), tiles=40.0)
     design = design_for(preset("quotient", "blinn", lights=2), scene)
@@ -147,7 +147,8 @@ def test_cuts(wraps):
 
 
 def test_no_bound_where_none_is_known():
-    """Another method; and words that may miss the nearest of too many texels, in spans that are not cut."""
+    """There is no bound for another method, or if words may miss the nearest texel in spans that are
+    not cut."""
     scene = scene_of("perspective", None)
     for method in ("linear", "quadratic"):
         design = design_for(preset(method, "blinn", lights=2), scene)

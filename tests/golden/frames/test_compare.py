@@ -1,4 +1,4 @@
-"""Errors off and at the border of a light, the bound, and the model that a frame is held against."""
+"""Errors at and away from the border of a light, the bound, and the model with which a frame is compared."""
 
 from dataclasses import replace
 
@@ -26,7 +26,7 @@ GREY = Material((0.05,) * 3, (0.02,) * 3, (0.98,) * 3, 20)
 
 
 def facing(normals, light=(0.3, 0.4, 1), depths=(0, 0, 0), background=(0, 0, 0), **material):
-    """One triangle, seen from the front, with given normals at its corners."""
+    """A triangle that faces the viewer, with given normals at its corners."""
     corners = np.array([[-1, -1, depths[0]], [1, -0.8, depths[1]], [0.1, 1, depths[2]]], dtype=float)
     normals = np.asarray(normals, dtype=float)
     mesh = Mesh(corners, np.array([[0, 1, 2]]), normals / np.linalg.norm(normals, axis=1, keepdims=True))
@@ -42,7 +42,10 @@ def made(method, model, scene):
 @pytest.mark.parametrize("method", METHODS)
 @pytest.mark.parametrize(("model", "name"), [("blinn", "exponent"), ("ggx", "roughness")])
 def test_steady_errors_keep_the_bound(method, model, name):
-    """Triangles at random, normals far apart, lengths that differ, a highlight of nearly the full channel."""
+    """Random triangles keep the bound.
+
+    Their normals are far apart, lengths differ, and highlights have nearly the full channel.
+    """
     rng, largest = np.random.default_rng(7), 0.0
     sharpest = 0.1 if method == "chord-local" else 0.15
     for value in (1, 30, 900) if name == "exponent" else (sharpest, 0.3, 0.9):
@@ -59,7 +62,7 @@ def test_steady_errors_keep_the_bound(method, model, name):
 @pytest.mark.long
 @pytest.mark.parametrize("method", ["quotient", "renormalise"])
 def test_every_exponent_and_model_is_within_an_lsb(method):
-    """An exponent in thirteen of the method's first model, and some of the others."""
+    """Every thirteenth exponent of the method's first model is tried, and some exponents of the others."""
     models = ["blinn", "phong"] if method == "quotient" else ["cosquad", *MODELS]
     exponents = range(1, 1001, 13)
     for model in dict.fromkeys(models):
@@ -71,7 +74,7 @@ def test_every_exponent_and_model_is_within_an_lsb(method):
 
 
 def test_pixels_at_the_border_are_counted_apart():
-    """N·L goes through 0: a picture without light there differs at the border alone by its light."""
+    """N·L goes through 0. A picture without this light differs only at the border of the light."""
     scene = facing([[1, 0, 0.2], [-1, 0, 0.2], [0, 0.1, 1]], (1, 0, 0), exponent=1)
     raster = rasterise(scene)
     border = border_mask(scene, raster, BLINN)
@@ -89,7 +92,7 @@ def test_pixels_at_the_border_are_counted_apart():
 
 
 def test_a_step_of_the_lobe_is_a_border():
-    """GGX of a large roughness is not 0 where N·H is: the pixels beside that count as well."""
+    """GGX of a large roughness is not 0 at N·H = 0, so pixels beside this line count as border, too."""
     scene = facing([[1, 0, 0.1], [-1, 0, 0.1], [0, 0.1, 1]], (1, 0, -0.4), roughness=0.9)
     raster = rasterise(scene)
     smooth, rough = (border_mask(scene, raster, model) for model in (BLINN, GGX))
@@ -100,7 +103,10 @@ def test_a_step_of_the_lobe_is_a_border():
 
 
 def test_the_step_is_that_of_the_curve():
-    """``r^8`` of the full channel for GGX; none of a polynomial that goes on behind."""
+    """The step is ``r^8`` of the full channel for GGX.
+
+    A polynomial, which goes on for negative N·H, has none.
+    """
     scene = facing(np.eye(3) + 1, roughness=0.83)
     dim = replace(scene, material=replace(scene.materials[0], specular=(0.73, 0.1, 0.1), exponent=1))
     assert highlight_step(dim, GGX) == pytest.approx(255 * 0.73 * 0.83**8, rel=1e-4)
@@ -113,7 +119,7 @@ def test_the_step_is_that_of_the_curve():
 
 @pytest.mark.parametrize(("method", "model"), [("chord-local", "ggx"), ("quotient", "blinn")])
 def test_an_unlit_surface_has_no_border(method, model):
-    """N·L goes through 0. The colour lies just under half a code, and its operand on the half."""
+    """N·L goes through 0. The colour is just under half a code, and its operand is on the half."""
     scene = facing([[-1, 0, 0.1], [1, 0, 0.1], [1, 0.1, 1]], (1, 0, 0), diffuse=100.4924 / 255, unlit=True)
     assert border_mask(replace(scene, material=GREY), rasterise(scene), GGX).any()
     found = compare(scene, made(method, model, scene), model_frame(scene, made(method, model, scene)))
@@ -124,7 +130,10 @@ def test_an_unlit_surface_has_no_border(method, model):
 
 @pytest.mark.parametrize("ambient", [0.0, 0.02, 0.3])
 def test_errors_of_srgb_are_of_its_codes(ambient):
-    """Against the curve written here again; the bound is the slope's at the least colour."""
+    """Errors are compared with a second implementation of the curve.
+
+    The bound takes the slope at the least colour.
+    """
     scene = facing([[1, 0, 0.2], [-1, 0, 0.1], [0, 0.1, 1]], ambient=(ambient,) * 3, background=(0.2, 0, 1))
     linear, design = (replace(made("quotient", "blinn", scene), transfer=of) for of in ("linear", "srgb"))
     own = compare(scene, linear, model_frame(scene, linear))
@@ -145,7 +154,8 @@ def test_errors_of_srgb_are_of_its_codes(ambient):
 
 
 def test_the_bound_of_encoded_colours_is_reached():
-    """Every dark colour, and one off by all that the linear bound allows; it may not be exceeded."""
+    """For every dark colour, a colour that is off by the whole linear bound keeps the encoded bound and comes
+    near it."""
     light, bound = np.linspace(0, 30, 3001), 0.6
     for shift in (-0.1, 0.1):
         found = np.round((light + shift) * 64) / 64

@@ -1,4 +1,4 @@
-"""Cutting spans by angle, against the true normals of the spans that were cut and float64."""
+"""Cutting spans by angle, against the true normals of the uncut spans and float64."""
 
 from dataclasses import fields, replace
 
@@ -23,7 +23,7 @@ EPSILON = 2.0**-53
 
 @pytest.fixture
 def out_of_range():
-    """Spans of 0 to 179.9 degrees and 1 to 60 pixels, and what they are cut to."""
+    """Spans of 0 to 179.9 degrees and 1 to 60 pixels, and their parts."""
     rng = np.random.default_rng(11)
     left, right = map(normalise, pairs_at(rng, 5000, rng.uniform(0, 179.9, 5000)))
     raster = raster_of(rng, left, right, rng.integers(1, 60, 5000, endpoint=True))
@@ -53,7 +53,7 @@ def test_every_part_is_narrow_or_one_pixel(out_of_range):
 
 
 def test_normals_at_cuts_are_true(out_of_range):
-    """Those of the line between the whole span's ends with their lengths, and so are the lengths."""
+    """At cuts, normals and lengths are those of the line between the whole span's ends with their lengths."""
     raster, cut, _ = out_of_range
     origin, first = origins(raster, cut)
     for offset, side in ((first, "left"), (first + cut.length - 1, "right")):
@@ -61,13 +61,16 @@ def test_normals_at_cuts_are_true(out_of_range):
         size = np.linalg.norm(line, axis=1)
         largest = np.maximum(raster.magnitude_left, raster.magnitude_right)[origin]
         np.testing.assert_allclose(getattr(cut, f"magnitude_{side}"), size, rtol=0, atol=1e-14)
-        # Each term is rounded three times, on both sides; division by a short line magnifies that.
+        # Each term is rounded three times on both sides. Division by a short line makes this larger.
         error = np.abs(getattr(cut, f"normal_{side}") - line / size[:, np.newaxis]).max(axis=1)
         assert (error <= EPSILON * (8 * largest / size + 8)).all()
 
 
 def test_parts_have_the_line_of_the_whole(out_of_range):
-    """At every pixel: so the true normal in the middle of a part is the whole span's there."""
+    """At every pixel the parts have the line of the whole span.
+
+    So the true normal in the middle of a part is the whole span's normal there.
+    """
     raster, cut, _ = out_of_range
     t = [r.offset / np.maximum(r.length - 1, 1)[r.span] for r in (raster, cut)]
     whole, parts = (line_at(r, r.span, at) for r, at in zip((raster, cut), t, strict=True))
@@ -103,13 +106,16 @@ def test_no_span_at_all():
 
 @pytest.mark.parametrize("length", [1, 2, 3, 4, 5, 4094, 4095])
 def test_opposite_normals(length):
-    """The curve jumps at its middle: an odd span has a pixel there, which any unit normal may have."""
+    """With opposite normals the curve jumps at its middle.
+
+    In an odd span a pixel is there, and any unit normal is right.
+    """
     rng = np.random.default_rng(14)
     left = np.eye(3)[:1]
     raster = raster_of(rng, left, -left, length)
     cut, count = cut_by_angle(raster, MAX_SPAN_ANGLE)
     assert count == (length > 1)
-    # Halving closes in on the jump.
+    # Halving comes closer and closer to the jump.
     assert len(cut.length) <= 1 + length.bit_length()
     assert (angles(cut)[cut.length > 1] == 0).all()
     ends = np.concatenate([cut.normal_left, cut.normal_right])
@@ -163,9 +169,9 @@ def test_quantised_ends():
 @pytest.mark.parametrize("materials", [2, 7, 1000])
 @pytest.mark.parametrize("cut", [False, True])
 def test_sorted_spans_are_a_permutation(materials, cut):
-    """Every span and fragment once, with all that belongs to it, in the given order within a material.
+    """Every span and fragment occurs once with all of its data, in the given order within a material.
 
-    x and the pixel are not read: they hold the numbers that spans and fragments had before.
+    x and the pixel are not read, so they hold the earlier numbers of spans and fragments.
     """
     rng = np.random.default_rng(17)
     left, right = map(normalise, pairs_at(rng, 3000, rng.uniform(0, 90, 3000)))
@@ -199,7 +205,7 @@ def test_sorted_spans_are_a_permutation(materials, cut):
     steps = np.diff(of_span)
     assert (steps >= 0).all()
     assert (np.diff(spans)[steps == 0] > 0).all()
-    # A span's fragments stay together, from its first to its last.
+    # The fragments of a span stay together, from its first to its last.
     assert np.array_equal(ordered.span, np.repeat(np.arange(count), ordered.length))
     start = np.cumsum(ordered.length) - ordered.length
     assert np.array_equal(ordered.offset, np.arange(len(ordered.span)) - start[ordered.span])

@@ -1,4 +1,4 @@
-"""Cutting spans by error: the method's own curve against float64, every pixel."""
+"""Cutting spans by error: the method's own curve against float64, at every pixel."""
 
 from dataclasses import replace
 
@@ -22,7 +22,10 @@ EXPONENTS = (1, 2, 10, 50, 100, 300, 1000)
 
 
 def lit_spans(rng, count, angle, longest, spread, lights=2):
-    """Spans anywhere under distant lights, each of one of the exponents; half near the H of a light."""
+    """Spans anywhere under distant lights, each with one of the exponents.
+
+    Half of them are near the H of a light.
+    """
     corners = np.array([[0.0, 0, 0], [1, 0, 0], [0, 1, 0]])
     faces = len(EXPONENTS)
     mesh = Mesh(
@@ -40,7 +43,7 @@ def lit_spans(rng, count, angle, longest, spread, lights=2):
     n = np.array(EXPONENTS)[raster.triangle][:, np.newaxis]
     near = normalise(near + rng.normal(size=near.shape) * np.minimum(1.5 / np.sqrt(n), 0.5))
     half = np.arange(count) % 2 == 0
-    # The span turned as a whole, so that its left end is near H.
+    # The whole span is turned so that its left end is near H.
     turned = normalise(near + (right - left))
     ends = {
         "normal_left": np.where(half[:, None], near, left),
@@ -52,12 +55,12 @@ def lit_spans(rng, count, angle, longest, spread, lights=2):
 
 
 def chord_operands(scene, cut):
-    """What ``chord-local`` makes of spans, as the pipeline takes them."""
+    """The operands that ``chord-local`` computes from the spans that the pipeline takes."""
     return METHOD.compute_values(local_values(scene, cut), cut.length)
 
 
 def reflected(u, exponent):
-    """Specular terms, each pixel of its own exponent."""
+    """Specular terms, where each pixel has its own exponent."""
     terms = np.empty_like(u)
     for n in EXPONENTS:
         terms[exponent == n] = REFLECTION_MODELS["cosquad"].reflect(1 - u[exponent == n], n)
@@ -71,12 +74,12 @@ CASES = {
     "needles": (60.0, 12, 1.5),
     "wide": (179.0, 60, 0.3),
 }
-"""Largest angle, longest span, spread of the lengths of the ends."""
+"""Largest angle, longest span, and spread of the lengths of the ends."""
 
 
 @pytest.mark.parametrize("case", CASES)
 def test_errors_of_the_chord_method_are_in_the_budgets(case):
-    """Every pixel of random true spans, n 1 to 1000: fit and arithmetic; no flag at all."""
+    """Fit and arithmetic at every pixel of random true spans, for n from 1 to 1000. No span is flagged."""
     angle, longest, spread = CASES[case]
     rng = np.random.default_rng(len(case))
     count = 3000 if longest < 1000 else 150
@@ -88,7 +91,7 @@ def test_errors_of_the_chord_method_are_in_the_budgets(case):
     assert not operands.out_of_range.any()
     cosine, u = exact_operands(scene, raster)
     exponent = np.array(EXPONENTS)[raster.triangle[raster.span]]
-    # Where the light is behind nothing is asked of either.
+    # Where the light is behind the surface, neither operand has to be right.
     front = cosine > 2.0**-24
     diffuse = 255 * np.abs(operands.cosine.values / ONE_VALUE - cosine)
     print(f"{case}: {diffuse[front].max():.3f} LSB, {len(cut.length)} of {count}")
@@ -123,7 +126,7 @@ def test_dark_scenes_of_srgb_are_cut_finer():
         cut, _ = cut_by_error(scene, raster, METHOD, limits)
         parts.append(len(cut.length))
         operands, front = chord_operands(scene, cut), cosine > 2.0**-24
-        # Spans of three pixels have no pixel between the places of their curve.
+        # In spans of three pixels every pixel is a place of the curve.
         front &= (cut.length[cut.span] > 3)[:, np.newaxis]
         diffuse = 255 * np.abs(operands.cosine.values / ONE_VALUE - cosine)[front].max()
         terms = [reflected(value, exponent) for value in (operands.highlight.values / ONE_VALUE, u)]
@@ -136,7 +139,7 @@ def test_dark_scenes_of_srgb_are_cut_finer():
 
 @pytest.mark.parametrize("case", ["narrow", "wide"])
 def test_flags_before_the_cut(case):
-    """Some of the uncut spans are flagged, if they are wide; of one or two pixels none is."""
+    """Some wide spans are flagged before the cut. Spans of one or two pixels are never flagged."""
     angle, longest, spread = CASES[case]
     rng = np.random.default_rng(3)
     scene, raster = lit_spans(rng, 2000, rng.uniform(5, angle, 2000), longest, spread)
@@ -147,7 +150,10 @@ def test_flags_before_the_cut(case):
 
 @pytest.mark.parametrize("method", ["linear", "quadratic", "angular", "chord-local"])
 def test_cut_by_error_of_every_method(method):
-    """No part is over the method's angle; one or two pixels stay; the curve is right at its quarters."""
+    """No part is over the method's angle.
+
+    Spans of one or two pixels are not cut. The curve is right at its quarters.
+    """
     rng = np.random.default_rng(7)
     scene, raster = lit_spans(rng, 1500, rng.uniform(0, 90, 1500), 50, 0.2)
     interpolator = METHODS[method]
@@ -157,7 +163,8 @@ def test_cut_by_error_of_every_method(method):
     assert (angles(cut)[cut.length > 1] <= max(map(interpolator.widest_span, EXPONENTS)) + 1e-9).all()
     if interpolator.given_values:
         return
-    # Normals of the method against true ones, at every pixel, by the highlight of the first light.
+    # Normals of the method are compared with true normals at every pixel, by the highlight of the first
+    # light.
     span = cut.span
     t = cut.offset / np.maximum(cut.length - 1, 1)[span]
     own = interpolator.exact_normals(cut.normal_left[span], cut.normal_right[span], t)
@@ -174,7 +181,7 @@ def test_cut_by_error_of_every_method(method):
 
 
 def test_cut_spans_chooses():
-    """By error for methods with a fit, by their ends for vectors, by angle for all others."""
+    """Methods with a fit are cut by error, methods with vectors by their ends, and all others by angle."""
     rng = np.random.default_rng(8)
     scene, raster = lit_spans(rng, 300, rng.uniform(0, 120, 300), 30, 0.2)
     for method, interpolator in METHODS.items():

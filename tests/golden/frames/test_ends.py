@@ -1,4 +1,4 @@
-"""Every model at the ends of its range: no warning of a library, and a frame within the model's error."""
+"""Every model at the ends of its range: no library warns, and a frame is within the model's error."""
 
 import warnings
 
@@ -42,7 +42,7 @@ def ball(rings=8):
 
 @pytest.mark.parametrize("name", [*LOBES, *MODELS, *CURVES])
 def test_no_warning_at_the_ends_of_a_model(name):
-    """By a method that serves all: design, tables, cuts, pipeline, golden frame and comparison."""
+    """A method that serves all models makes design, tables, cuts, pipeline, golden frame and comparison."""
     with warnings.catch_warnings():
         warnings.simplefilter("error")
         mesh = ball()
@@ -63,7 +63,7 @@ def test_no_warning_at_the_ends_of_a_model(name):
     "model", [GGX, pytest.param(BECKMANN, marks=pytest.mark.long)], ids=lambda model: model.name
 )
 def test_no_warning_of_a_small_roughness(model):
-    """The curve is 1 at its peak and goes down to 0 elsewhere, as for any roughness in the limit."""
+    """The curve is 1 at its peak and falls to 0 elsewhere, which is the limit of small roughness."""
     cosine = np.r_[-1, 0, np.linspace(0, 1, 1000, endpoint=False), 1 - 2.0**-53, 1]
     for roughness in np.geomspace(5e-324, 1, 200).tolist():
         value = model.reflect(cosine, roughness)

@@ -1,4 +1,4 @@
-"""Lights that fade, through spans that are cut for them, against the exact frame."""
+"""Lights that fade, with spans that are cut for them, against the exact frame."""
 
 from dataclasses import replace
 
@@ -30,7 +30,7 @@ LIGHTS = {
 
 
 def drawn(scene, exponent):
-    """Errors of a frame, its cut spans, and those of lights that do not fade."""
+    """Errors of a frame and its cut spans, and the cut spans of lights that do not fade."""
     design = preset("chord-local", "blinn", len(scene.lights))
     fading = tuple(k for k, light in enumerate(scene.lights) if light.fades)
     frame = model_frame(scene, replace(design, factors=fading))
@@ -41,19 +41,20 @@ def drawn(scene, exponent):
 @pytest.mark.parametrize("viewer", ["near", pytest.param("distant", marks=pytest.mark.long)])
 @pytest.mark.parametrize("name", LIGHTS)
 def test_floor(name, viewer):
-    """Spans of hundreds of pixels: within an LSB in all, whatever lies between two places of a span."""
+    """In spans of hundreds of pixels the total error is within an LSB, whatever lies between two places of a
+    span."""
     for exponent in (1, 200):
         scene = replace(floor([HIGH], exponent, viewer), lights=(LIGHTS[name],))
         errors, frame = drawn(scene, exponent)
         assert errors.total_error.max_lsb < 0.75
         assert errors.arithmetic_error.max_lsb < 0.55
-        # The light is in the picture, and a span is more than a pixel.
+        # The light is in the picture, and a span has more than one pixel.
         assert frame.image.max() > 100
         assert frame.pixels > 5 * frame.spans
 
 
 def test_teapot():
-    """Lights with and without a factor side by side."""
+    """Lights with and without a factor in one frame."""
     scene = lit_teapot(50)
     lamps = list(scene.lights)
     lamps[0] = replace(lamps[0], spot=tuple(-np.array(lamps[0].position)), cone=(5, 40))
@@ -64,7 +65,7 @@ def test_teapot():
 
 
 def test_every_pixel_is_within_the_budgets():
-    """What the cuts state: a N·L within 0.12 LSB and a within 0.25, of the quadratics alone."""
+    """The quadratics alone keep the budgets of the cuts: a N·L within 0.12 LSB and a within 0.25 LSB."""
     scene = replace(floor([HIGH], 20), lights=(LIGHTS["spot"],))
     cut, _ = cut_by_error(scene, rasterise(scene), METHOD)
     values, factors = local_operands(scene, cut, factors=(0,))
@@ -74,12 +75,12 @@ def test_every_pixel_is_within_the_budgets():
     exact = light.factor(points)
     upright = np.einsum("fk,k->f", light.towards(points), [0.0, 1, 0])
     assert 255 * np.abs(cosine[:, 0] - exact * upright).max() <= METHOD.DIFFUSE_BUDGET
-    # Where the highlight shows; outside of it a is not needed as well.
+    # Where the highlight shows. Elsewhere a need not be right.
     assert 255 * np.abs(factor[:, 0] - exact).max() <= METHOD.FACTOR_BUDGET + 0.01
 
 
 def test_operands_by_hand():
-    """Codes of a and of a N·L at a first pixel; the light without a factor has its own N·L."""
+    """Codes of a and of a N·L at a first pixel. The light without a factor has its own N·L."""
     scene = floor([HIGH, HIGH])
     scene = replace(scene, lights=(scene.lights[0], LIGHTS["by distance"]))
     cut, _ = cut_by_error(scene, rasterise(scene), METHOD)
@@ -123,7 +124,7 @@ def test_refusals(options, says):
 
 
 def test_without_specular_light_there_is_no_factor():
-    """N·L carries it: the same hardware as of light that does not fade."""
+    """N·L carries the factor, so the hardware is that of a light that does not fade."""
     scene = replace(
         floor([HIGH], 20), lights=(LIGHTS["spot"],), material=replace(material(20), specular=(0, 0, 0))
     )

@@ -26,7 +26,7 @@ CENTRE = np.array([0.0, 1.575, 0.0])
 
 
 def lit_teapot(exponent, triangles=1000, viewer="near"):
-    """A lamp to the upper left, one close to the lid, and the sun."""
+    """The teapot under a lamp to the upper left, a lamp close to the lid, and the sun."""
     mesh = teapot(triangles)
     camera = Camera.framing(mesh.vertices, (0.4, 0.5, 1), "perspective", 4 / 3, field_of_view=45)
     lamps = [Light(position=tuple(CENTRE + offset)) for offset in ([-3.2, 4.0, 4.5], [0.3, 2.1, 0.5])]
@@ -34,7 +34,7 @@ def lit_teapot(exponent, triangles=1000, viewer="near"):
 
 
 def floor(lamps, exponent=50, viewer="near", eye=(0, 1.5, 5)):
-    """A square of two triangles, from so near that its spans are as wide as the picture."""
+    """A square of two triangles, seen from so near that its spans are as wide as the picture."""
     vertices = np.array([[-4, 0, -4], [4, 0, -4], [4, 0, 4], [-4, 0, 4]], dtype=float)
     mesh = Mesh(vertices, np.array([[0, 2, 1], [0, 3, 2]]), np.tile([0.0, 1, 0], (4, 1)))
     camera = Camera(eye, (0, 0, 0), projection="perspective", field_of_view=50)
@@ -43,7 +43,8 @@ def floor(lamps, exponent=50, viewer="near", eye=(0, 1.5, 5)):
 
 
 def local_errors(scene, by_material=False):
-    """Errors in LSB of full reflection over all fragments and lights, diffuse and specular; the cut spans."""
+    """Diffuse and specular errors in LSB of full reflection, over all fragments and lights, and the cut
+    spans."""
     raster = rasterise(scene)
     cut, count = cut_by_error(scene, raster, METHOD)
     if by_material:
@@ -51,7 +52,7 @@ def local_errors(scene, by_material=False):
     values = local_values(scene, cut)
     operands = METHOD.compute_values(values, cut.length)
     assert not operands.out_of_range.any()
-    # Every fragment by its triangle and pixel.
+    # Every fragment is found by its triangle and pixel.
     key, wanted = (
         r.triangle[r.span].astype(np.int64) * scene.width * scene.height + r.pixel for r in (cut, raster)
     )
@@ -69,7 +70,7 @@ def local_errors(scene, by_material=False):
         expected[which] = np.where(
             cosine[which] > 0, REFLECTION_MODELS["cosquad"].reflect(1 - u[which], n), 0
         )
-    # At a step of the words from 0 the sign of N·L, and with it the highlight, may be the other.
+    # Within a step of the words from 0, the sign of N·L may be wrong, and so may the highlight.
     sure = np.abs(cosine) > 2.0**-25
     return (
         255 * np.abs(diffuse - np.maximum(cosine, 0)).max(initial=0),
@@ -83,9 +84,10 @@ def local_errors(scene, by_material=False):
 @pytest.mark.parametrize("exponent", [1, 10, 100, 1000])
 @pytest.mark.parametrize("triangles", [100, 1000, 10_000])
 def test_local_operands_of_the_teapot(exponent, triangles):
-    """Fit, arithmetic and the last units together, at every pixel: under half an LSB of full reflection.
+    """Fit, arithmetic and the last units together are under half an LSB of full reflection at every pixel.
 
-    0.4 and 0.12 LSB for the former; the specular unit's own error adds up to 0.05, the diffuse one's 0.01.
+    The fit and the arithmetic have 0.4 and 0.12 LSB. The specular unit's error adds up to 0.05 LSB, and the
+    diffuse unit's 0.01 LSB.
     """
     diffuse, specular, cut, count, expected = local_errors(lit_teapot(exponent, triangles))
     print(
@@ -116,15 +118,18 @@ LAMPS = {
 @pytest.mark.parametrize("lamps", LAMPS)
 @pytest.mark.parametrize("exponent", [50, *(pytest.param(n, marks=pytest.mark.long) for n in (1, 1000))])
 def test_stiff_lamps_over_a_floor(lamps, viewer, exponent):
-    """Spans of hundreds of pixels, L and H that turn within a few of them: the same bounds, and no NaN."""
-    # From below the lamps above are opposite: L = -V here and there, and N·L over 0.
+    """In spans of hundreds of pixels L and H turn within a few pixels.
+
+    The bounds hold, and no number is NaN.
+    """
+    # Seen from below, the lamps above are opposite: at some points L = -V and N·L is over 0.
     eye = (0, -1.5, 5) if lamps == "through the floor" else (0, 1.5, 5)
     scene = floor(LAMPS[lamps], exponent, viewer, eye)
     diffuse, specular, cut, _, _ = local_errors(scene)
     print(f"{lamps}, {viewer}, n = {exponent}: {diffuse:.3f}, {specular:.3f} LSB, {len(cut.length)} spans")
     assert diffuse <= METHOD.DIFFUSE_BUDGET + 0.01
     assert specular <= METHOD.HIGHLIGHT_BUDGET + 0.05
-    # What the float64 renderer shows of the parts is what it shows of the whole spans.
+    # The parts show in the float64 renderer what the whole spans show.
     raster = rasterise(scene)
     whole = shade_spans(scene, raster, "normalised", REFLECTION_MODELS["cosquad"])
     parts = shade_spans(scene, cut, "normalised", REFLECTION_MODELS["cosquad"])
@@ -135,7 +140,7 @@ def test_stiff_lamps_over_a_floor(lamps, viewer, exponent):
 
 
 def test_a_light_behind_cuts_nothing_but_what_turns():
-    """Where N·L stays negative the light gives nothing, however badly the quadratics fit."""
+    """Where N·L stays negative the light gives nothing, however large the errors of the quadratics are."""
     scene = floor([(0.5, -9.0, 0.5)], 10, "distant")
     above = replace(scene, lights=(Light(position=(0.5, 9.0, 0.5)),))
     fine, _ = cut_by_error(above, rasterise(scene), METHOD)
@@ -165,7 +170,8 @@ def test_local_cut_keeps_fragments():
 
 
 def test_local_values_by_hand():
-    """Of one span: first, middle and last, rounded to codes in units of ONE_SQUARED."""
+    """The values of one span at its first, middle and last place, rounded to codes in units of
+    ONE_SQUARED."""
     scene = floor([(0.5, 0.4, 0.5), (-1, 2, 1)])
     cut, _ = cut_by_error(scene, rasterise(scene), METHOD)
     values = local_values(scene, cut)
@@ -179,7 +185,7 @@ def test_local_values_by_hand():
     corners = scene.mesh.vertices[scene.mesh.faces[cut.triangle[span]]]
     points = shares[0] @ corners, middle / middle.sum() @ corners, shares[1] @ corners
     assert np.abs(ends - [points[0], points[2]]).max() < 1e-12
-    # On the floor's line of sight: halfway on the screen is not halfway in the world.
+    # The floor is seen at a grazing angle, so the middle on the screen is not the middle in the world.
     eye = np.array(scene.camera.position)
     for index, light in enumerate(scene.lights):
         for place, point in enumerate(points):
@@ -193,7 +199,7 @@ def test_local_values_by_hand():
 
 
 def test_short_local_spans_do_not_bend():
-    """A span of one pixel has one value, one of two the mean in the middle."""
+    """A span of one pixel has one value. In a span of two pixels the middle value is the mean."""
     scene = lit_teapot(1000, 1000)
     cut, _ = cut_by_error(scene, rasterise(scene), METHOD)
     values = local_values(scene, cut)
@@ -206,7 +212,7 @@ def test_short_local_spans_do_not_bend():
 
 
 def test_a_pipeline_of_more_lights():
-    """The lights that the scene has not are dark in every pixel."""
+    """If the pipeline has more lights than the scene, the further lights are dark in every pixel."""
     scene = lit_teapot(10, 100)
     cut, _ = cut_by_error(scene, rasterise(scene), METHOD)
     three, five = local_values(scene, cut), local_values(scene, cut, 5)
@@ -241,7 +247,7 @@ def test_local_results_do_not_depend_on_the_chunks(monkeypatch):
 
 
 def test_local_spans_by_material():
-    """Each triangle's own exponent decides; the spans may be put in the order of their materials."""
+    """Each triangle has its own exponent. Spans may be sorted by their materials."""
     scene = lit_teapot(10, 1000)
     faces = len(scene.mesh.faces)
     mesh = replace(scene.mesh, material=np.arange(faces) % 2)

@@ -26,7 +26,8 @@ LIGHT = tuple(normalise((0.05, 0.03, 1.0)))
 PROMISED = 0.5 + 1 / 16 + 1 / 4
 """LSB, docs/guide/accuracy.md, for diffuse and specular light of 1 together."""
 
-# A search that climbs found it, with W nearer to each other: W of 9.05 to 11.4, normals within 10.3 degrees.
+# A climbing search found this triangle, with values of W nearer to each other: W of 9.05 to 11.4, normals
+# within 10.3 degrees.
 WORST = (
     [(75.56, 19.3), (21.85, 35.73), (4.36, 14.49)],
     [11.415, 9.046, 9.155],
@@ -35,7 +36,8 @@ WORST = (
 
 
 def scene_of(places, w, tilts, exponent, specular=0.5):
-    """A triangle in each cell of a picture, from the pixels, W and normals ``(x, y, 1)`` of its corners."""
+    """A scene with a triangle in each cell of a picture, from the pixels, W and normals ``(x, y, 1)`` of its
+    corners."""
     places, w, tilts = (np.asarray(values, dtype=np.float64) for values in (places, w, tilts))
     count = len(places)
     height, slope = ROWS * count, np.tan(np.radians(20))
@@ -50,7 +52,7 @@ def scene_of(places, w, tilts, exponent, specular=0.5):
 
 
 def errors(scene, design, image):
-    """Largest error of each triangle in LSB, where N·L is not within rounding of 0."""
+    """Largest error of each triangle in LSB, without pixels whose N·L is within rounding of 0."""
     raster = rasterise(scene)
     which = np.flatnonzero(raster.visible)
     lit = np.abs(fragment_normals(scene, raster, which) @ LIGHT) > 0.002
@@ -62,7 +64,7 @@ def errors(scene, design, image):
 
 
 def by_hardware(scene, design):
-    """Largest error of each triangle by geometry in hardware, and what is counted."""
+    """Largest error of each triangle drawn by geometry in hardware, and the counters."""
     renderer = Renderer(design)
     sent = sent_triangles(scene, renderer)
     drawn = renderer.compute(sent.triangles, sent.frame, constants_of(scene, design))
@@ -72,7 +74,7 @@ def by_hardware(scene, design):
 
 
 def test_unequal_lengths_are_counted():
-    """Hardware cuts by an angle alone, and is 2 LSB off, which is told; software is not."""
+    """Hardware cuts by an angle alone and is 2 LSB off, which is counted. Software is not off."""
     scene = scene_of(*([part] for part in WORST), 992, 0.98)
     error, counts = by_hardware(scene, ARCS)
     assert error.max() > 2
@@ -83,7 +85,7 @@ def test_unequal_lengths_are_counted():
 
 @pytest.mark.parametrize("model", ["blinn", "phong"])
 def test_unequal_lengths_do_not_matter_to_vectors(model):
-    """The same triangle, and W of 1 to 100: within 0.6 LSB; nothing is counted."""
+    """With vectors the same triangle, and W of 1 to 100, is within 0.6 LSB, and nothing is counted."""
     design = preset("quotient", model)
     for scene in (scene_of(*([part] for part in WORST), 992, 0.98), deep_scene(100, 1000)):
         error, counts = by_hardware(scene, design)
@@ -93,7 +95,7 @@ def test_unequal_lengths_do_not_matter_to_vectors(model):
 
 @pytest.mark.parametrize("exponent", [30, 992])
 def test_what_is_not_counted_is_as_promised(exponent):
-    """The worst triangle, flatter and flatter, and its like: each is within the promise or counted."""
+    """The worst triangle is made flatter and flatter. Each triangle is within the promise, or is counted."""
     rng = np.random.default_rng(3)
     counted = {True: [], False: []}
     for share in (0.03, 0.07, 0.2, 0.5, 1.0):
@@ -110,7 +112,7 @@ def test_what_is_not_counted_is_as_promised(exponent):
 
 
 def deep_scene(ratio, exponent):
-    """Triangles with one corner, or two, farther away than the others by a ratio."""
+    """Triangles with one corner, or two corners, farther away than the others by a ratio."""
     rng = np.random.default_rng(8)
     places = np.array([[(2, 3), (70, 5), (40, 15)], [(2, 2), (4, 15), (70, 10)]])
     w = np.array([(1, ratio, 1), (1, ratio, ratio)])
@@ -124,7 +126,7 @@ CHEAP = "chord-local", "renormalise", "linear"
     "method", [pytest.param(name, marks=[] if name in CHEAP else pytest.mark.long) for name in METHODS]
 )
 def test_no_method_is_silently_wrong_in_any_depth(method):
-    """By software no pixel is off, or the missed spans are counted; by hardware the counters tell."""
+    """With software no pixel is off, or the missed spans are counted. With hardware the counters tell."""
     design = preset(method, "blinn")
     for ratio in (300.0, 1e5):
         scene = deep_scene(ratio, 30)
@@ -138,13 +140,13 @@ def test_no_method_is_silently_wrong_in_any_depth(method):
 
 @pytest.mark.parametrize(("far", "wrong"), [(500, False), (1e5, True)])
 def test_far_surfaces_that_change_places_are_counted(far, wrong):
-    """Two sheets 0.1 % apart, the nearer one second, and a near triangle that sets the range of 1/W."""
+    """Two sheets are 0.1 % apart, with the nearer sheet second. A near triangle sets the range of 1/W."""
     corner = [(2, 2), (98, 2), (50, 38)]
     tilted = np.array([1, 1.0006, 1.0003])
     w = np.array([np.full(3, 0.9), 1.001 * far * tilted, far * tilted])
     scene = scene_of([corner] * 3, w, np.zeros((3, 3, 2)), 10)
     corners = scene.mesh.vertices.reshape(-1, 3, 3).copy()
-    # The second sheet lies before the first one.
+    # The second sheet lies in front of the first.
     corners[2] = corners[1] / 1.001
     scene = replace(scene, mesh=replace(scene.mesh, vertices=corners.reshape(-1, 3)))
     frame = triangle_frame(scene, Renderer(preset("renormalise", "blinn")))
@@ -153,7 +155,7 @@ def test_far_surfaces_that_change_places_are_counted(far, wrong):
 
 
 def test_lengths_beyond_the_words_of_renormalise_are_cut():
-    """Corners at W of 3031, 7564 and 0.86: 235 LSB off, before such spans were cut."""
+    """Corners at W of 3031, 7564 and 0.86 were 235 LSB off, before spans of this kind were cut."""
     scene = scene_of(
         [[(98, 3), (97, 36), (2, 20)]], [(3031, 7564, 0.86)], [[(0.6, 0), (-0.6, 0.1), (0, 0)]], 6
     )

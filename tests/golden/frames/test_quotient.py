@@ -1,4 +1,4 @@
-"""The quotient method in whole frames: the corners of its rules, and the largest error a search finds."""
+"""The quotient method in whole frames: the limits of its rules, and the largest error that a search finds."""
 
 from dataclasses import replace
 
@@ -27,7 +27,8 @@ OPPOSITE = ((0, 0, 1), (0, 0, -1), (0, 0, -1))
 
 
 def scene_of(places, w, normals, lights=(LIGHT,), size=(40, 16), exponent=10, **options):
-    """A triangle in each of some cells of one size, by places of 0 to 1 in it, W and normals; V is z."""
+    """A scene with a triangle in each of some equal cells: places of 0 to 1 in the cell, W and normals; V is
+    z."""
     places, w, normals = (np.asarray(values, dtype=np.float64) for values in (places, w, normals))
     columns, rows = size
     count = len(places)
@@ -45,7 +46,7 @@ def scene_of(places, w, normals, lights=(LIGHT,), size=(40, 16), exponent=10, **
 
 
 def one(normals, places=((0, 0), (0.4, 1), (1, 0.1)), w=(1, 1.3, 1.1), **options):
-    """A triangle that faces the viewer; with ``places`` in another order its back does."""
+    """A triangle that faces the viewer. With ``places`` in another order its back faces the viewer."""
     return scene_of([places], [w], [normals], **options)
 
 
@@ -75,13 +76,13 @@ CORNERS = {
     "pixels one and two at a time": (one(SOFT, ((0.5, 0), (0.52, 1), (0.57, 0.9)), size=(40, 30)), 3),
     "W of 1 to 10,000": (one(SOFT, w=(1, 1e4, 30)), 3),
 }
-"""Scenes, and the brightness that some pixel has at least."""
+"""Scenes, and a brightness that at least one pixel has."""
 
 
 @pytest.mark.parametrize("model", ["blinn", "phong"])
 @pytest.mark.parametrize("name", CORNERS)
 def test_corners(name, model):
-    """Every pixel off the border of a light is rounded right, nearly; none is flagged."""
+    """Nearly every pixel away from the border of a light is rounded right, and none is flagged."""
     scene, brightest = CORNERS[name]
     for exponent in (1, 1000):
         scene = replace(scene, material=replace(scene.material, exponent=exponent))
@@ -95,7 +96,7 @@ def test_corners(name, model):
 
 
 def test_spans_of_one_two_and_4095_pixels_occur():
-    """The rasteriser's spans in the scenes above."""
+    """The scenes above have spans of one, two and 4095 pixels."""
     names = "4095 pixels", "pixels one and two at a time"
     lengths = {name: rasterise(CORNERS[name][0]).length for name in names}
     assert lengths["4095 pixels"].max() == 4095
@@ -108,7 +109,10 @@ def test_back_faces_that_are_culled():
 
 
 def test_opposite_viewer_by_the_definition():
-    """L = -V: R·V is 1 - 2 (N·L)^2, brightest where a light grazes; Blinn's model has no highlight."""
+    """With L = -V, R·V is 1 - 2 (N·L)^2, which is largest where the light grazes.
+
+    Blinn's model has no highlight.
+    """
     for exponent in (1, 10):
         scene = one(GRAZING, lights=[(0, 0, -1)], exponent=exponent)
         frame, errors = drawn(scene, "phong")
@@ -138,7 +142,7 @@ def test_materials_of_other_exponents(model):
 
 @pytest.mark.parametrize("method", ["quotient", "renormalise"])
 def test_pixels_where_opposite_normals_cancel(method):
-    """They have the normal of the face, as in the reference."""
+    """Where opposite normals cancel, pixels have the normal of the face, as in the reference."""
     places = (-0.0375, -0.0375), (0.4625, -0.0375), (-0.0375, 0.4625)
     scene = one(((0, 0, 1), (0, 0, -1), (0, 0, 1)), places, (1, 1, 1), size=(44, 44), exponent=3)
     shown = rasterise(scene)
@@ -158,14 +162,14 @@ def test_local_lights_are_refused():
 
 
 GOALS = {"blinn": 0.60, "phong": 0.80, "ggx": 0.65, "beckmann": 0.65}
-"""Largest error of a pixel in LSB: of powers to 1000, of microfacets from roughness 0.2 on."""
+"""Largest error of a pixel in LSB: for powers up to 1000, and for microfacets from roughness 0.2 on."""
 
 
 def shading_error(scene, model):
-    """Largest error of each triangle in LSB: of pixels, and of their intensity before it is rounded; and the
+    """Largest error of each triangle in LSB: of pixels, of their intensity before it is rounded, and the
     bound of their spans.
 
-    Without pixels whose N·L or N·H is within 0.002 of 0.
+    It leaves out pixels whose N·L or N·H is within 0.002 of 0.
     """
     design = preset("quotient", model)
     frame = model_frame(scene, design)
@@ -198,9 +202,9 @@ def shading_error(scene, model):
 
 
 def climb(model, parameter, seed, count, rounds, size=(100, 24)):
-    """Triangles, a light, and their errors: of many that are moved a little those that are more wrong stay.
+    """A climbing search: triangles are moved a little in each round, and those with larger errors stay.
 
-    W to 1:10,000, normals to 150 degrees apart, any light.
+    W goes up to 1:10,000, normals are up to 150 degrees apart, and the light has any direction.
     """
     rng = np.random.default_rng(seed)
     light = normalise(rng.normal(size=3) + np.array([0, 0, 0.5]))

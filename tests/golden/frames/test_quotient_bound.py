@@ -1,4 +1,4 @@
-"""Bound of frames by the quotient method: never exceeded, and near what is found."""
+"""Bound of frames by the quotient method: it is never exceeded, and errors come near it."""
 
 from dataclasses import replace
 
@@ -21,7 +21,7 @@ from blysk.sim.meshes.teapot import teapot
 
 
 def _scene(rng):
-    """Two triangles of random normals, close to a viewer in perspective, under one or two lights."""
+    """Two triangles with random normals, close to a viewer in perspective, under one or two lights."""
     corners = np.c_[rng.uniform(-1, 1, (4, 2)), rng.uniform(-3, 0.5, 4)]
     faces = np.array([[0, 1, 2], [2, 1, 3]])
     normals = normalise(np.array([0, 0, 0.6]) + rng.normal(size=(4, 3)))
@@ -48,9 +48,9 @@ def test_no_frame_exceeds_its_bound(model):
 
 @pytest.mark.parametrize("model", ["blinn", "phong"])
 def test_no_frame_by_triangles_exceeds_its_bound(model):
-    """Where the frame shows the triangle that the exact one shows; normals far apart, and slivers, too.
+    """The bound holds where the frame shows the triangle that the exact frame shows.
 
-    With one light or two.
+    Normals are far apart, some triangles are slivers, and there are one or two lights.
     """
     rng = np.random.default_rng(7)
     ratios = []

@@ -1,4 +1,4 @@
-"""Frames with vertex colours and textures by the bit-accurate model, against float64; what is refused."""
+"""Frames with vertex colours and textures by the bit-accurate model, against float64; refusals."""
 
 from dataclasses import replace
 
@@ -23,7 +23,7 @@ GLOSSY = Material((0.1,) * 3, (0.6,) * 3, (0.3,) * 3, 50)
 
 
 def patch(colors=False, coordinates=False):
-    """A bent patch of 32 triangles, six times as deep as wide, with what its surface needs."""
+    """A bent patch of 32 triangles, six times as deep as wide, with the data of its surface."""
     rng = np.random.default_rng(3)
     x, z = (side.ravel() for side in np.meshgrid(np.linspace(-1, 1, 5), np.linspace(-6, 6, 5)))
     corner = np.array([i * 5 + j for i in range(4) for j in range(4)])[:, np.newaxis]
@@ -43,7 +43,8 @@ def scene_of(mesh, material=GLOSSY, projection="perspective", lights=(LIGHT,)):
 
 
 def errors_of(scene, method="quotient", lights=1):
-    """Errors of a frame by the model in linear LSB, of rounded float64 channels before they are rounded."""
+    """Errors of a frame by the model in linear LSB, against float64 channels that are rounded and that are
+    not."""
     design = design_for(preset(method, "blinn", lights), scene)
     prepared = prepare(scene, design)
     pixels = design.compute(prepared.spans, prepared.constants)
@@ -55,7 +56,10 @@ def errors_of(scene, method="quotient", lights=1):
 @pytest.mark.parametrize("projection", ["perspective", "orthographic"])
 @pytest.mark.parametrize("method", ["quotient", "chord-local", "renormalise", "quadratic"])
 def test_vertex_colours(method, projection):
-    """Every method has them, whatever its spans bring; quadratic has its own error of the highlight."""
+    """Every method serves vertex colours, whatever its spans bring.
+
+    quadratic also has its own error of the highlight.
+    """
     error = errors_of(scene_of(patch(colors=True), projection=projection), method)
     assert 0.45 < error.max() < (0.57 if method != "quadratic" else 2)
 
@@ -75,21 +79,24 @@ CHECKER = np.repeat((np.indices((64, 64)).sum(axis=0) % 2)[:, :, np.newaxis].ast
     ids=["checker", "levels, colours", "clamp, mirror"],
 )
 def test_textures_at_a_grazing_angle(texture, colors, projection):
-    """A texel's rounding is at most 2^-12, and its light 0.7 of the channel: 0.05 LSB beside the rounding."""
+    """The rounding of a texel is at most 2^-12, and its light is 0.7 of the channel.
+
+    This adds 0.05 LSB to the rounding.
+    """
     mesh = patch(colors, coordinates=True)
     error = errors_of(scene_of(mesh, replace(GLOSSY, texture=texture), projection))
     assert error.max() < 0.57
 
 
 def test_nearest_texels_differ_at_their_borders_only():
-    """At a few pixels a border of texels is nearer than the error of a coordinate."""
+    """At a few pixels the border of a texel is nearer than the error of a coordinate."""
     texture = Texture(NOISE, filter="nearest", mipmapped=False)
     error = errors_of(scene_of(patch(coordinates=True), replace(GLOSSY, texture=texture)))
     assert np.quantile(error, 0.999) < 0.57
 
 
 def test_tinted_emission_and_two_materials():
-    """A tinted material with a texture, and another that emits light and has none."""
+    """A tinted material with a texture, and another material that emits light and has no texture."""
     mesh = patch(coordinates=True)
     mesh = replace(mesh, material=np.arange(len(mesh.faces)) % 2)
     materials = [
@@ -111,7 +118,7 @@ def test_without_lights():
 
 
 def test_an_albedo_path_shows_a_plain_surface():
-    """White, as without the path but for a rounding."""
+    """With a white albedo a plain surface is shown as without the albedo path, except for a rounding."""
     colored, plain = scene_of(patch(colors=True)), scene_of(patch())
     design = design_for(preset("quotient", "blinn"), colored)
     prepared = prepare(plain, design)

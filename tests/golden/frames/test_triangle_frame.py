@@ -24,7 +24,10 @@ METHODS = "quadratic", "renormalise"
 @pytest.mark.parametrize("method", METHODS)
 @pytest.mark.parametrize(("triangles", "exponent"), [(220, 1), (1000, 20), (220, 100), (1000, 1000)])
 def test_within_one_lsb_of_exact_normals(method, triangles, exponent):
-    """At every pixel of a frame, and at the pixels of the rasteriser in float64, all and no others."""
+    """The frame covers the pixels of the float64 rasteriser and no others.
+
+    At each pixel the error is within one LSB.
+    """
     drawn = scene("teapot", size=(160, 120), triangles=triangles, exponent=exponent)
     renderer = Renderer(preset(method, "cosquad", operand="one_minus_cosine"))
     frame = triangle_frame(drawn, renderer)
@@ -49,7 +52,7 @@ def test_within_one_lsb_of_exact_normals(method, triangles, exponent):
     ],
 )
 def test_vectors_within_0_6_lsb_of_exact_normals(model, triangles, exponent, back_faces):
-    """The quotient method, with one light; hardly a pixel is not the nearest code."""
+    """With the quotient method and one light hardly any pixel is not the nearest code."""
     drawn = scene("teapot", size=(160, 120), triangles=triangles, exponent=exponent, back_faces=back_faces)
     renderer = Renderer(preset("quotient", model))
     frame, exact = triangle_frame(drawn, renderer), render(drawn, "phong", REFLECTION_MODELS[model])
@@ -57,7 +60,7 @@ def test_vectors_within_0_6_lsb_of_exact_normals(model, triangles, exponent, bac
     error = np.abs(frame.image - exact.image * 255)[exact.mask]
     assert 0.49 < error.max() < 0.6
     assert 0 < (error > 0.5).mean() < 0.01
-    # More pieces than there are spans only where normals turn far along a span.
+    # There are more pieces than spans only if normals turn far along a span.
     raster = rasterise(drawn)
     whole = len(raster.length) + raster.hidden_spans
     assert (back_faces == "flip") == (raster.culled == 0)
@@ -66,7 +69,7 @@ def test_vectors_within_0_6_lsb_of_exact_normals(model, triangles, exponent, bac
 
 
 LIGHTS = (-0.5, 0.8, 0.7), (1.0, 0.2, 0.4), (0.3, -1.0, 0.6), (0.2, 1.0, -0.5)
-"""Directions of lights; the last is behind the horizon for most of what is seen."""
+"""Directions of lights. The last light is behind the horizon for most of the visible surface."""
 
 
 @pytest.mark.parametrize(
@@ -74,7 +77,7 @@ LIGHTS = (-0.5, 0.8, 0.7), (1.0, 0.2, 0.4), (0.3, -1.0, 0.6), (0.2, 1.0, -0.5)
     [("blinn", 2, 1000, 50), ("blinn", 4, 64, 1000), ("phong", 2, 64, 50), ("phong", 3, 1000, 1000)],
 )
 def test_vectors_of_several_lights(model, lights, triangles, exponent):
-    """Turned into the frame of each light; the exact frame is made of the lights' directions alone."""
+    """Vectors are turned into the frame of each light. The exact frame takes only the lights' directions."""
     drawn = scene("teapot", size=(160, 120), triangles=triangles, exponent=exponent, lights=LIGHTS[:lights])
     # A light that the scene does not have is black.
     renderer = Renderer(preset("quotient", model, lights=max(lights, 3)))
@@ -89,7 +92,7 @@ def test_vectors_of_several_lights(model, lights, triangles, exponent):
 
 @pytest.mark.parametrize("model", ["blinn", "phong"])
 def test_first_light_off(model):
-    """It shines on nothing; the others' squares are those of its frame all the same."""
+    """The first light is off and lights nothing. The squares of other lights still come from its frame."""
     drawn = scene("teapot", size=(96, 72), triangles=220, exponent=20, lights=LIGHTS[:3])
     lights = (replace(drawn.lights[0], color=(0.0, 0.0, 0.0)), *drawn.lights[1:])
     drawn = replace(drawn, lights=lights)
@@ -99,7 +102,10 @@ def test_first_light_off(model):
 
 
 def test_normals_that_are_longer_than_1():
-    """As files may have them: those of a triangle are made shorter by one factor, so that nothing wraps."""
+    """Files may have normals longer than 1.
+
+    One factor shortens the normals of a triangle, so that nothing wraps.
+    """
     drawn = scene("teapot", size=(64, 48), triangles=220, lights=LIGHTS[:2])
     mesh = replace(drawn.mesh, normals=drawn.mesh.normals * (1 + 2.0**-8))
     renderer = Renderer(preset("quotient", "blinn", lights=2))
@@ -112,7 +118,7 @@ def test_normals_that_are_longer_than_1():
 
 @pytest.mark.parametrize("lights", [1, 3])
 def test_vectors_without_highlights(lights):
-    """z of a frame is along its light."""
+    """The z axis of a frame is along its light."""
     drawn = scene("teapot", size=(64, 48), triangles=220, specular=0, lights=LIGHTS[:lights])
     frame = triangle_frame(drawn, Renderer(preset("quotient", None, lights=lights)))
     exact = render(drawn, "phong", REFLECTION_MODELS["blinn"])
@@ -121,7 +127,10 @@ def test_vectors_without_highlights(lights):
 
 
 def test_another_surface_only_within_the_depths_rounding():
-    """Sheets folded flat at their edge: where the other one shows, depths in float64 are nearly equal."""
+    """Where another sheet shows, its depth in float64 is nearly equal.
+
+    The sheets are folded flat at their common edge.
+    """
     drawn = scene("teapot", size=(640, 480), triangles=64)
     frame = triangle_frame(drawn, Renderer(preset("renormalise", x_bits=10, y_bits=9)))
     raster = rasterise(drawn)
@@ -148,7 +157,10 @@ def test_another_surface_only_within_the_depths_rounding():
 
 
 def test_true_lines_are_not_cut():
-    """One span a scanline and triangle, as the rasteriser's, hidden ones included; arcs have more."""
+    """Each scanline of a triangle gives one span, as in the rasteriser, also if it is hidden.
+
+    Methods with arcs have more.
+    """
     drawn = scene("teapot", size=(160, 120), triangles=220, back_faces="cull")
     counts = {method: triangle_frame(drawn, Renderer(preset(method, "cosquad"))).counts for method in METHODS}
     assert counts["renormalise"]["cut"] == 0 < counts["quadratic"]["cut"]
@@ -159,7 +171,10 @@ def test_true_lines_are_not_cut():
 
 
 def test_two_sided_materials():
-    """Holes in a teapot, through which back faces of two materials would be seen: those of one are."""
+    """Through holes in a teapot, back faces of two materials are visible.
+
+    Only the two-sided material is drawn.
+    """
     drawn = scene("teapot", size=(160, 120), triangles=1000, back_faces="cull")
     faces = drawn.mesh.faces[np.arange(len(drawn.mesh.faces)) % 8 > 3]
     mesh = replace(drawn.mesh, faces=faces, material=np.arange(len(faces)) // 16 % 2)
@@ -177,7 +192,7 @@ def test_two_sided_materials():
 
 
 def test_methods_and_geometry_must_fit():
-    """Values are not what triangles give, nor normals where lines are taken."""
+    """Triangles give no values, and no unit normals to a method that takes lines."""
     with pytest.raises(ValueError, match="triangles give normals, and chord-local takes values"):
         Renderer(preset("chord-local", "cosquad"))
     with pytest.raises(ValueError, match="takes vectors for several lights, the geometry gives vectors"):
@@ -197,7 +212,8 @@ def test_methods_and_geometry_must_fit():
 @pytest.mark.parametrize("projection", ["perspective", "orthographic"])
 @pytest.mark.parametrize("texture", [None, "bilinear", "nearest"])
 def test_colours_and_textures_within_their_bound(projection, texture):
-    """Every pixel of a teapot whose colours are its places; with a texture of noise, in its levels."""
+    """A teapot whose vertex colours are its positions, and with a texture of noise in levels: every pixel is
+    within its bound."""
     drawn = scene("teapot", size=(80, 60), triangles=1000, projection=projection)
     place = (drawn.mesh.vertices - drawn.mesh.vertices.min(axis=0)) / np.ptp(drawn.mesh.vertices, axis=0)
     mesh = replace(drawn.mesh, colors=place, coordinates=3 * place[:, :2] - 1)
