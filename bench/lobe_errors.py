@@ -1,4 +1,4 @@
-"""Errors of the table of a lobe, by its size: largest errors over all operands of its steps."""
+"""Errors of a lobe's table, by the size of the table: largest errors over all operands of its steps."""
 
 from dataclasses import dataclass, replace
 

@@ -31,7 +31,7 @@ Figures = Mapping[str, Mapping[str, int]]
 """Figures by the entry's name, then by the figure's name."""
 
 TOLERANCE = 0.02
-"""Share of its baseline by which a figure may change."""
+"""A figure may change by this share of its baseline."""
 
 FILE = Path(str(files(__package__))) / "baselines.json"
 """File of the baselines."""

@@ -65,8 +65,8 @@ DESIGNS = (
 )
 """Method, model and gate of each design.
 
-Every specular unit has a design, and every method that takes normals or vectors and gives a pixel a cycle.
-In the default design each batch writes the table of another lobe.
+Every specular unit has a design. Every method that takes normals or vectors, and gives a pixel a cycle, has a
+design, too. In the default design each batch writes the table of another lobe.
 """
 
 WIDEST = 44

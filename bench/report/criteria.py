@@ -104,7 +104,7 @@ def resources(lights: int) -> dict[str, int]:
 
 
 def use(date: str) -> dict[str, int]:
-    """Resources of the default pipeline after its committed placement, which has this date; see `placed`."""
+    """Resources of the default pipeline, from its committed placement of this date; see `placed`."""
     entry = placed(DEVICE)[_METHOD, _MODEL]
     if entry["date"] != date:
         raise ValueError(f"the committed placement is of {entry['date']}, not of {date}")

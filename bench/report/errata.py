@@ -214,7 +214,10 @@ def extrapolated_end() -> Pair:
 
 
 def scaled_in_place() -> Pair:
-    """Error of the last normal of the same span: ``dN`` itself times i/5 at pixel i, and a scaled copy."""
+    """Error of the last normal of a span of 10 degrees and 6 pixels, with ``dN`` times i/5 at pixel i.
+
+    The first result scales ``dN`` itself at each pixel, the second result a copy.
+    """
     angle, pixels = math.radians(10), 6
     left, right = np.array([0.0, 0, 1]), np.array([math.sin(angle), 0, math.cos(angle)])
     shares = np.arange(pixels) / (pixels - 1)
@@ -224,7 +227,7 @@ def scaled_in_place() -> Pair:
 
 
 def wrong_variable() -> Pair:
-    """Largest error of ``P0 x + P1 y + P2`` at three corners: with ``P1 x`` for ``P1 y``, and as written."""
+    """Largest error of ``P0 x + P1 y + P2`` at three corners: with P1 x as second term, and as written."""
     corners = np.array([[0.0, 0, 1], [1, 0, 1], [0, 1, 1]])
     values = np.array([0.2, 0.4, 0.9])
     plane = np.linalg.solve(corners, values)

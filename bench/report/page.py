@@ -94,7 +94,7 @@ def _is_number(value: Cell) -> bool:
 
 
 def _kinds(table: Table) -> list[str]:
-    """Class of each column: a number, a short text or a long one."""
+    """Class of each column: a number, a short text or a long text."""
     kinds = []
     for cells in zip(*table.rows, strict=True) if table.rows else [()] * len(table.columns):
         there = [cell for cell in cells if cell is not None]

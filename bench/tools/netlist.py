@@ -246,7 +246,7 @@ class Netlist:
         return any(not any(isinstance(bit, int) for bit in operand) for operand in operands)
 
     def _rounds(self, cell) -> bool:
-        """Whether an adder adds one bit of a word to its upper bits."""
+        """Whether an adder adds one bit of a word to the upper bits of the same word."""
         return any(
             sum(isinstance(bit, int) for bit in dict.fromkeys(cell["connections"][port])) <= 1
             and isinstance(cell["connections"][port][0], int)

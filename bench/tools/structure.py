@@ -129,7 +129,7 @@ def _join_delays(graph: Graph) -> None:
 
 
 def _drop_indirect(graph: Graph) -> None:
-    """Drop arrows that choose, and arrows beside a longer path. Arrows from ports that only choose stay."""
+    """Drop arrows that carry choices, and arrows beside a longer path. Ports that only choose keep theirs."""
     passing = {a for (a, _), is_data in graph.edges.items() if is_data}
     graph.edges = {
         edge: data

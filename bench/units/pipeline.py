@@ -282,7 +282,7 @@ def _halves(unit, rng, count):
 
 
 def _brightest(unit, rng, count):
-    """Three terms of eight full channels each. Every bit of the constants is 1 and 0 before."""
+    """Three terms of eight full channels each. Earlier writes set every bit of a constant to 1 and to 0."""
     design = unit.model
     spans = any_spans(rng, design, short_lengths(rng, count))
     (constants,) = any_constants(rng, design, spans)

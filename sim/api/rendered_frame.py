@@ -188,7 +188,7 @@ class RenderedFrame:
             "cycles": f"{self.cycles:,}",
             "spans": f"{self.spans:,}",
             "pixels": f"{self.pixels:,}",
-            "largest error, exact normals, same model": (
+            "largest error against exact normals, same model": (
                 f"{self.error.max_lsb:.3f} LSB of {SPACES[self.comparison.transfer]}"
             ),
             "PSNR": f"{self.error.psnr_db:.2f} dB",

@@ -28,7 +28,7 @@ def _expect(unit, case):
 
 
 def _requests(unit, rng, count):
-    """Any addresses, after writes of the whole memory, and then of two places again.
+    """Any addresses. Before, the whole memory is written, and then two places are written again.
 
     The writes of one of these places end with half a word.
     """

@@ -43,7 +43,8 @@ def _expect(unit, case):
 def _squares(model, rng, count):
     """``m = x^2 + y^2`` and ``w = z^2`` of vectors of lengths 1/8 to 1, and the squared sine ``m/(m + w)``.
 
-    In half of the vectors the logarithm of the squared sine is uniform. Some are replaced by 1 minus it.
+    In half of the vectors the logarithm of the squared sine is uniform. In some vectors it is replaced by 1
+    minus the squared sine.
     """
     length = 2.0 ** rng.uniform(-3, 0, count)
     sine = np.where(rng.random(count) < 0.5, 2.0 ** -rng.uniform(0, 20, count), rng.uniform(0, 1, count))
@@ -66,7 +67,7 @@ def _pixels(model, rng, squares, cosine) -> PixelWords:
 
 
 def _vectors(unit, rng, count):
-    """Vectors of every direction. Some are at the peak of a highlight or orthogonal to it. Some face away."""
+    """Vectors of every direction. Some are at a highlight's peak, some orthogonal to H, some face away."""
     p = unit.model.spans
     *squares, _ = _squares(p, rng, count)
     pixels = _pixels(p, rng, squares, rng.uniform(-1, 1, (count, p.lights)))

@@ -103,7 +103,7 @@ def _longest(unit, rng, count):
 
 
 def _borders(unit, rng, count):
-    """Spans with nearly no angle, at the border of a result's rounding. One step of a state changes it."""
+    """Spans of nearly no angle, at the border of a rounding. One step of a state changes the result."""
     p, length = unit.model, np.full(count // 12, 12)
     cut = p.state_format.fraction_bits - p.result_format.fraction_bits
     starts = []

@@ -38,7 +38,7 @@ def _short(unit, rng, count):
 
 
 def _outside(unit, rng, count):
-    """Spans of a small picture. About every fourth leaves the picture on the right or below."""
+    """Spans of a small picture. About every fourth span leaves the picture on the right or below."""
     case = _spans(unit, rng, count, 20, lines=2)
     beats, given = case.beats, unit.model
     far, low = rng.random((2, count)) < 0.15

@@ -96,7 +96,7 @@ def _exponents(unit, rng, count):
 
 
 def _terminator(unit, rng, count):
-    """Operands at the peak of a highlight. N·L is 0, plus or minus a power of two, or the least code."""
+    """Operands at the peak of a highlight. N·L is 0, a power of two of either sign, or the least code."""
     bits = 1 << np.arange(34)
     cosine = rng.permutation(np.r_[0, bits, -bits, _cosine_format(unit).min_code])
     highlight = np.full(len(cosine), ONE**2)

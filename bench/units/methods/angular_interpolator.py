@@ -27,7 +27,7 @@ def _pole(unit, rng, count):
 def _longest_words(unit, rng, count):
     """Normals and L with the longest codes that rounding gives.
 
-    Some normals are opposite, at 60 degrees or at 90 degrees.
+    Some pairs of normals are opposite, 60 degrees apart or 90 degrees apart.
     """
 
     def rounded(about):
@@ -79,8 +79,8 @@ RECORD = Record(
     | {"pole": Stimulus(_pole, 200), "longest words": Stimulus(_longest_words, 400, stalled=False)},
     waivers={
         "cordic_*": (
-            "The controlling bit is above the bits of the axes, which are at most 0.71 and the root of 2. So "
-            "it is 0."
+            "The axes of the great circle are at most 0.71 and the root of 2. The controlling bit is above "
+            "these bits, so it is 0."
         ),
         "minor_operand": (
             "The fault changes the register only while the output is stalled. Its word has been read by then."

@@ -58,8 +58,8 @@ RECORD = Record(
     waivers=SETUP.waivers
     | {
         "phase_entry": (
-            "The fault changes the register only while the output is stalled. By then only the value in its "
-            "word is still unread."
+            "The fault changes the register only while the output is stalled. By then all fields of its word "
+            "have been read, except the value."
         ),
         "recurrence_0.*": "The signal marks the last pixel of a span. Nothing reads this signal.",
     },

@@ -92,8 +92,8 @@ RECORD = Record(
         "last bits": Stimulus(_last_bits, 40_000, stalled=False),
     },
     waivers={
-        "slot": "The fault turns slot 4 into 6. Slot 5 still follows, and only slots 0 and 5 have effects.",
-        "turn": "The fault turns slot 4 into 6. Slot 5 still follows, and only slots 0 and 5 have effects.",
+        "slot": "The fault turns slot 4 into slot 6. Slot 5 still follows. Only slots 0 and 5 have effects.",
+        "turn": "The fault turns slot 4 into slot 6. Slot 5 still follows. Only slots 0 and 5 have effects.",
     },
     still={
         "products of the polynomial are at most 0.0127 and 0.0293": "rounded_2[13-16] rounded_1[14-16]",
