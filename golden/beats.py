@@ -19,7 +19,7 @@ class Spans:
     Parameters
     ----------
     x, y : int arrays, shape (spans,)
-        First pixel of each span, 0 to 4095, or the largest coordinate of the pipeline.
+        First pixel of each span, 0 to the largest coordinate of the pipeline, which is at most 4095.
     length : int array, shape (spans,)
         Number of pixels, 0 to 4095. A span of length 0 gives no pixel. After the largest x, x goes on from 0.
     normal_left, normal_right : int arrays, shape (spans, 3)

@@ -104,7 +104,7 @@ class FrameConstants:
     ambient : int array, shape (3,)
         Ambient colour operand, ``UQ(11, 6)`` in LSB.
     direction, halfway : int arrays, shape (lights, 3)
-        Unit vectors to each light, and half-way to the viewer, ``SQ(1, 17)``.
+        Unit vectors of each light, ``SQ(1, 17)``: L to the light, and H half-way to the viewer.
     diffuse, specular : int arrays, shape (lights, 3)
         Colour operands of each light, ``UQ(11, 6)`` in LSB.
     lobe : LobeTable, optional
@@ -332,14 +332,14 @@ _MEANINGS = {
 
 
 class LightMeanings(NamedTuple):
-    """Words for the vectors of a light among the frame constants.
+    """Texts for the vectors of a light, in the tables of frame constants.
 
     Parameters
     ----------
     direction, halfway : str
         Meaning of L and of H.
     one : str
-        Code of 1.
+        The code that stands for 1, as a text.
     """
 
     direction: str
@@ -360,7 +360,7 @@ NOT_READ = LightMeanings("not read", "not read")
 
 
 def by_material(constants: FrameConstants | Sequence[FrameConstants]) -> list[FrameConstants]:
-    """Constants of each material, from the constants of the only material or of each material."""
+    """Constants as a sequence, one for each material. A single `FrameConstants` is of the only material."""
     return [constants] if isinstance(constants, FrameConstants) else list(constants)
 
 
@@ -387,7 +387,7 @@ def address_table(
     loads_tables : bool
         Whether tables are loaded.
     of_a_light : LightMeanings
-        Words for L and H, see `Interpolator.light_meanings`.
+        Texts for L and H, see `Interpolator.light_meanings`.
     axes : sequence of str
         Names of the axes that each further light has, see `FrameConstants.axes`.
     albedo : Albedo or None

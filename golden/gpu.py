@@ -37,8 +37,8 @@ class Gpu:
     def __post_init__(self) -> None:
         if self.drawing.size != self.buffer.mode.size or self.drawing.lines != self.buffer.lines:
             raise ValueError(
-                f"drawn are {self.drawing.size} pixels by {self.drawing.lines} lines, shown "
-                f"{self.buffer.mode.size} by {self.buffer.lines}"
+                f"the drawing has {self.drawing.size} pixels in bands of {self.drawing.lines} lines, "
+                f"the display {self.buffer.mode.size} in bands of {self.buffer.lines}"
             )
 
     def frames(self, count: int) -> np.ndarray:

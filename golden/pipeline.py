@@ -75,7 +75,8 @@ class ShadingPipeline:
         - an exponent is fixed with a lobe;
         - a lobe takes 1 - N·H with other than 25 fraction bits;
         - the method has a scale, but there is no lobe;
-        - factors are not different lights in order, or lack specular light or a method that takes values;
+        - factors do not name different lights in ascending order;
+        - there are factors, but no specular light, or the method takes no values;
         - the transfer is unknown;
         - the albedo has tints, but there is no specular light;
         - texels are outside of several pipelines, or of a core on a bus (a `BuildError`).
@@ -128,7 +129,7 @@ class ShadingPipeline:
     def _check_factors(self) -> None:
         """Refuse factors of lights that do not exist, and factors that no unit of the design takes."""
         if not (self.interpolator.serves_local and self.specular):
-            raise ValueError("factors of lights need values of spans, of chord-local, and specular light")
+            raise ValueError("factors of lights need the method chord-local, and specular light")
         if list(self.factors) != sorted(set(self.factors) & set(range(self.lights))):
             raise ValueError(f"factors must be different lights of {self.lights}, in order")
 

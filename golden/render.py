@@ -20,7 +20,7 @@ from blysk.golden.pipeline import ShadingPipeline
 __all__ = ["DrawnPixels", "Renderer"]
 
 _OF_THE_METHOD = Geometry()
-"""Stands for the geometry that suits a design's method."""
+"""Default of `Renderer.geometry`: it stands for the geometry that suits the design's method."""
 
 
 @dataclass(frozen=True)
@@ -70,7 +70,7 @@ class Renderer:
     ----------
     design : ShadingPipeline
         The shading pipeline, of a method that takes normals or vectors. If its `Build` has a coarse depth
-        test, that drops a span before shading if all of its pixels are hidden. The picture is the same.
+        test, the test drops a span before shading if all of its pixels are hidden. The picture is the same.
     geometry : Geometry
         The part that makes spans of triangles. It has ``lines`` for a method that takes true lines, and
         ``vectors`` for a method that takes vectors; with several lights ``rotates``, too. By default the
@@ -135,7 +135,7 @@ class Renderer:
 
     @property
     def rows(self) -> int:
-        """Components that further lights have of a vector of geometry."""
+        """Number of components that `LightAdapter` adds to a vector, for all further lights."""
         return len(self.axes) * (self.design.lights - 1)
 
     def compute(

@@ -22,7 +22,7 @@ STATUS = (*DRAWN, "late_bands", "frames_shown")
 class GpuUnit(wiring.Component):
     """Draws a mesh by a `DrawUnit`, and shows it by a `DisplayUnit`. `Gpu` is the bit-accurate model.
 
-    There are three clocks, see `DisplayUnit`. Pixels are drawn as fast as they come, and shown a band later.
+    There are three clocks, see `DisplayUnit`. While the display shows a band, the next band is drawn.
 
     Parameters
     ----------

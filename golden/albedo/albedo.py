@@ -21,7 +21,7 @@ class Albedo:
     """Albedo of every pixel: vertex colour times colour of the texture.
 
     Spans become words of each pixel, words become attributes, and texture coordinates become a colour of the
-    texture. With both colours their product is rounded to 16 fraction bits.
+    texture. If there are both colours, their product is rounded to 16 fraction bits.
 
     Parameters
     ----------

@@ -29,7 +29,7 @@ def whole_texels(left: np.ndarray, right: np.ndarray) -> tuple[np.ndarray, np.nd
     Returns
     -------
     base : int64 array, shape (spans, 2)
-        Nearest to the middle of both ends.
+        The whole texel nearest to the middle between both ends.
     range : int64 array, shape (spans,)
         Least whole number r, 0 or more, with ``|coordinate - base| < 2^r`` at both ends. A source of spans
         cuts a span if its r would make the error too large.
@@ -44,9 +44,9 @@ def whole_texels(left: np.ndarray, right: np.ndarray) -> tuple[np.ndarray, np.nd
 class SpanAttributes(NamedTuple):
     """Attributes of spans: lines at the first pixel, and their steps to the next.
 
-    At pixel i the word of each attribute, and of 1/W, is ``start + i 2^-exponent step``. The word of an
-    attribute A is U, A/W times a scale of the span. The word of 1/W has the same scale. Without perspective
-    the word of an attribute is A itself.
+    At pixel i the word of each attribute, and of 1/W, is ``start + i 2^-exponent step``. The word U of an
+    attribute A is A/W times a scale of the span. The word of 1/W has the same scale. Without perspective the
+    word of an attribute is A itself.
 
     Parameters
     ----------
@@ -57,7 +57,7 @@ class SpanAttributes(NamedTuple):
     weight_start, weight_step : int64 arrays, shape (spans,), or None
         Codes of 1/W; ``None`` without perspective.
     base : int64 array, shape (spans, 2), or None
-        Whole texel from which texture coordinates count, within `AttributeSpans.LARGEST_BASE` of 0.
+        Whole texel from which texture coordinates are counted, within `AttributeSpans.LARGEST_BASE` of 0.
     range : int64 array, shape (spans,), or None
         0 to 11: a texture coordinate is ``base + A 2^range`` texels of the span's level.
     level : int64 array, shape (spans,), or None
@@ -127,7 +127,7 @@ class SpanAttributes(NamedTuple):
         weights : pair of float64 arrays, shape (spans,)
             1/W at both ends, over 0, in any unit. Only with perspective.
         level : int array, shape (spans,)
-            Level of the texture; all 0 without it.
+            Level of the texture. By default all levels are 0.
         periodic : bool array, shape (spans, 2), or bool
             Whether u and v may change by multiples of `AttributeSpans.PERIOD` texels: with ``repeat`` and
             ``mirror``. The base is then brought into its range. If not, a span with both ends
@@ -182,7 +182,7 @@ class SpanAttributes(NamedTuple):
 
     @staticmethod
     def _placed(ends: np.ndarray, periodic: np.ndarray | bool) -> tuple[np.ndarray, np.ndarray]:
-        """Base and range; texture coordinates at both ends, shape (2, spans, 2), become attributes."""
+        """Base and range. In ``ends``, shape (2, spans, 2), attributes replace the texture coordinates."""
         model = AttributeSpans
         limit, half = model.LARGEST_BASE, model.PERIOD // 2
         for outside, border in ((ends > limit, limit), (ends < -limit, -limit)):
@@ -201,7 +201,7 @@ class SpanAttributes(NamedTuple):
     def _coded(
         model: "AttributeSpans", lines: np.ndarray, steps: np.ndarray
     ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Codes of starts and steps, and the exponents, of lines of shape (2, spans, lines)."""
+        """Codes of starts, codes of steps, and exponents. ``lines`` has the shape (2, spans, lines)."""
         word = model.WORD_FORMAT
         step = (lines[1] - lines[0]) / steps[:, np.newaxis]
         largest = np.maximum(np.abs(step).max(axis=1), 2.0**-60)

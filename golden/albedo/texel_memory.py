@@ -17,7 +17,7 @@ LEVEL_BITS = 4
 """Bits of a level, and of the logarithm of a width or height."""
 
 _BASE_UNIT = 2
-"""Number of words of a bank from one base, or one index, to the next."""
+"""Words of a bank in one unit of a base, or of an index."""
 
 
 def levels_placed(width: int, height: int, levels: int) -> tuple[list[tuple[int, int]], int]:
@@ -135,8 +135,9 @@ class TexelMemory:
     *Code.* A channel has 12 bits: 11 bits of a number, and above them a bit for the size of its step. In
     units of 2^-14, a fine code c stands for c, up to 1/8. A coarse code c stands for ``8 c + 7``. These
     values are in linear light, times ``1 - 2^-14``: the filter divides by this factor at its end, so that the
-    largest code is exactly 1. A texel is off by at most 2^-15 to 1/8, and 2^-12 from there on. After the
-    transfer of sRGB both are at most 0.101 LSB. Equal steps of 2^-12 would be off by 0.4 LSB near black.
+    largest code is exactly 1. Up to 1/8 a texel is off by at most 2^-15, above 1/8 by at most 2^-12. After
+    the transfer of sRGB both errors are at most 0.101 LSB. Equal steps of 2^-12 would be off by 0.4 LSB near
+    black.
 
     Parameters
     ----------

@@ -40,8 +40,8 @@ class TextureAddress:
 
     An address is ``base + place of the level + (row/2) (width/2) + column/2``, all of them in different bits.
 
-    Coordinates are `coordinate_format`. With ``repeat`` and ``mirror``, which have a period of at most 2048
-    texels, they may wrap. With ``clamp`` they have to stay in the format.
+    Coordinates have the format `coordinate_format`. ``repeat`` and ``mirror`` have a period of at most 2048
+    texels, so coordinates may wrap. With ``clamp`` they have to stay in the format.
 
     Parameters
     ----------
@@ -50,7 +50,8 @@ class TextureAddress:
     share_bits : int
         Fraction bits of a coordinate, and of a weight, 8 to 14.
     bilinear : bool
-        Whether there are textures with another filter than ``nearest``. If not, weights are 0 or 1, in a bit.
+        Whether there are textures with another filter than ``nearest``. If not, a weight is 0 or 1, and has
+        one bit.
 
     Raises
     ------

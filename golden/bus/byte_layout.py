@@ -26,8 +26,8 @@ class Field:
     format : str
         Number format, for people.
     below : int, optional
-        Codes of values are less than this number; by default every code is a value. Low bits past the last
-        value are read as the last value.
+        Number of values: codes are 0 to ``below - 1``. By default every code of the width is a value. A
+        larger code on the bus is read as the last value.
 
     Raises
     ------
@@ -58,7 +58,7 @@ class Field:
 
     @property
     def values(self) -> str:
-        """Description of its numbers, for people."""
+        """Description of the field's numbers, for people."""
         return self.format or (f"0 to {self.below - 1}" if self.below else f"{self.width} bits")
 
     @property

@@ -10,7 +10,7 @@ from blysk.golden.bus.byte_layout import ByteLayout
 __all__ = ["PACKETS", "Framing"]
 
 PACKETS = {"shader": "span", "geometry": "frame", "render": "run"}
-"""Packet that ends with TLAST, by core: a span, a frame, or a run of pixels side by side in one row."""
+"""For each core the packet that TLAST ends: a span, a frame, or a run of pixels side by side in a row."""
 
 
 @dataclass(frozen=True)

@@ -124,7 +124,7 @@ def frame_registers(keep: bool = False) -> list[Register]:
     """
     borders = {
         "left": "first column of the picture on the grid",
-        "top": "first row",
+        "top": "first row of the picture on the grid",
         "right": "column after the last column",
         "bottom": "row after the last row",
     }
@@ -263,7 +263,7 @@ class RegisterMap:
                 text="why accesses were refused; a 1 clears its bit",
                 bits=causes,
             ),
-            Register("refused", 0x010, "read-only", ADDRESS_BITS, text="address of the access refused last"),
+            Register("refused", 0x010, "read-only", ADDRESS_BITS, text="address of the last refused access"),
         ]
         counters = [
             Register(name, COUNTERS + 4 * k, "read-only", width, text=f"{text}; since the reset")
@@ -304,7 +304,7 @@ class RegisterFile:
     def access(
         self, address: int, data: int | None = None, strobe: int = 15, busy: bool = False
     ) -> tuple[int, str]:
-        """The read word, 0 for a write, and the cause of a refusal, else an empty text.
+        """The read word (0 for a write), and the cause of a refusal (an empty text if there is none).
 
         Parameters
         ----------

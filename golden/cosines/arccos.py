@@ -48,9 +48,9 @@ class Arccos:
     result           UQ(2, 16)          rounded half up
     ================ ================== ==========================================================
 
-    The coefficients, ``c2 x`` (by up to ``2^-(19-i)``) and the result (by up to 2^-17) are rounded;
-    `arithmetic_error` bounds the sum of the three errors. Largest model error by segment, in radians, before
-    any rounding:
+    Three roundings have errors: of the coefficients, of ``c2 x`` (up to ``2^-(19-i)``), and of the result (up
+    to 2^-17). `arithmetic_error` bounds their sum. Largest model error by segment, in radians, before any
+    rounding:
 
     ============ ============= ========== =========
     segment      as published  corrected  refitted

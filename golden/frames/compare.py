@@ -320,7 +320,7 @@ def _errors(image: np.ndarray, exact: np.ndarray, border: np.ndarray) -> FrameEr
 
 
 def _mean_squares(image: np.ndarray, exact: np.ndarray) -> dict[str, float]:
-    """Normalised mean squared errors against pixels of the approximated model, which are overwritten."""
+    """Normalised mean squared errors of pixels. The pixels of the approximated model are overwritten."""
     exact *= 255
     published, share = mnse_published(image, exact)
     return {

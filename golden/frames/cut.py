@@ -30,7 +30,7 @@ __all__ = [
 ]
 
 _Criterion = Callable[[np.ndarray, np.ndarray, np.ndarray], np.ndarray]
-"""Whether parts of spans have to be halved: of span, first pixel and last pixel."""
+"""Function of span, first pixel and last pixel: whether this part of the span has to be halved."""
 
 _LARGEST_RATIO = 128.0
 """Ratio of depths up to which a colour is exact to a part of an LSB."""
@@ -116,7 +116,7 @@ def cut_by_angle(raster: Raster, largest_angle: float, also: _Criterion | None =
     largest_angle : float
         Largest angle in degrees, over 0.
     also : callable, optional
-        Whether to halve parts of spans for another reason: of span, first pixel and last pixel.
+        Function of span, first pixel and last pixel: whether to halve this part for another reason.
 
     Returns
     -------
@@ -265,7 +265,7 @@ def _normals(raster: Raster, span: np.ndarray, place: np.ndarray) -> np.ndarray:
 
 
 def _halve(raster: Raster, is_wide: _Criterion, also: _Criterion | None = None) -> tuple[Raster, int]:
-    """Halve spans while ``is_wide(span, first pixel, last pixel)`` or ``also`` of the same.
+    """Halve spans while ``is_wide(span, first pixel, last pixel)`` or ``also`` with these arguments is true.
 
     Also returns the number of halved spans.
     """

@@ -52,7 +52,7 @@ class Picture:
 
     @property
     def pixels(self) -> int:
-        """Number of pixels on its output, hidden pixels included."""
+        """Number of pixels on the pipeline's output, hidden pixels included."""
         return len(self.cut_raster.span)
 
 

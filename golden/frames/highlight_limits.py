@@ -36,14 +36,14 @@ class _Curve:
         return values[np.clip(np.searchsorted(self._points[0], u, "right") - 1, 0, None)]
 
     def tolerance(self, u: np.ndarray) -> np.ndarray:
-        """As in `HighlightLimits`."""
+        """Largest error of u that keeps the budget, see `HighlightLimits.tolerance`."""
         steepest = np.maximum(self._from(self._points[1], u), 2.0**-self.scale)
         found: np.ndarray = LocalChordInterpolator.HIGHLIGHT_BUDGET / (255 * steepest)
         return found
 
     @cached_property
     def turn(self) -> float:
-        """As in `HighlightLimits`, for a single material."""
+        """Angle in radians by which a normal may turn, see `HighlightLimits.turn`."""
         u, _, slopes = curve_lines(self.reflection, self.parameter)
         # A slope belongs to the interval up to the next argument.
         steepest = (np.sqrt(2 * np.append(u[1:], 2.0)) * np.abs(slopes)).max()
@@ -51,7 +51,7 @@ class _Curve:
         return found
 
     def is_lit(self, u: np.ndarray, least: float) -> np.ndarray:
-        """As in `HighlightLimits`, for the least highlight that counts."""
+        """Whether a highlight may be over ``least``, for this u or any larger u."""
         return (self._from(self._points[2], u) > least) & (u < 1)
 
 

@@ -56,8 +56,8 @@ class SurfacePoints:
 
     - ``normal`` N and ``viewer`` V have the shape (count, 3);
     - ``direction`` L has the shape (lights, count, 3);
-    - ``factor`` a, ``diffuse``, which is a N·L, and ``highlight`` u have the shape (count, lights). a is 1
-      for a light that does not fade.
+    - ``factor`` a, ``diffuse`` and ``highlight`` u have the shape (count, lights). ``diffuse`` is ``a N·L``.
+      a is 1 for a light that does not fade.
     """
 
     normal: np.ndarray

@@ -13,10 +13,11 @@ __all__ = ["DepthTester"]
 
 @dataclass(frozen=True)
 class DepthTester:
-    """``floor(z + k step)`` at pixel k of a span. If this is less than the stored depth, the pixel is drawn.
+    """Depth test. A pixel is drawn if its depth is less than the stored depth.
 
-    The sum is exact. It saturates to 0 and to `FARTHEST`. A picture is cleared to the depth `CLEARED`,
-    `FARTHEST` + 1. So the first pixel at a place is always drawn. If depths are equal, the first pixel stays.
+    The depth of pixel k of a span is ``floor(z + k step)``. The sum is exact. It saturates to 0 and to
+    `FARTHEST`. A picture is cleared to the depth `CLEARED`, `FARTHEST` + 1. So the first pixel at a place is
+    always drawn. If depths are equal, the first pixel stays.
 
     The step is rounded to nine fraction bits; this error, at most 2^-10, adds up along a span. With this
     error the depth of a pixel is off by at most ``2^23`` times `GradientSetup.error`, plus 1 for the cut.

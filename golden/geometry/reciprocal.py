@@ -25,9 +25,13 @@ class Reciprocal:
     1/x          UQ(1, 25)    rounded; 1 for x = 1
     ============ ============ =====================================================================
 
-    The error is at most `ERROR`, 0.875 steps of the result. It is the sum of 2^-27 for the rounding of the
-    slope, 2^-18 times 2^-9; less than 2^-28 for the fit and the rounding of c0; and 2^-26 for the last
-    rounding. The unit takes two multiplications.
+    The error is at most `ERROR`, 0.875 steps of the result. It is the sum of three errors:
+
+    - 2^-27 for the rounding of the slope: 2^-18 times 2^-9;
+    - less than 2^-28 for the fit and the rounding of c0;
+    - 2^-26 for the last rounding.
+
+    The unit takes two multiplications.
 
     Source: docs/theory/geometry.md#normals; not in the documents.
     """

@@ -18,7 +18,7 @@ _LARGEST = ATTRIBUTE.max_code
 _FARTHEST = DEPTH.max_code - 1
 
 _DEEPEST = 1000.0
-"""W divided by the least W of a frame, from which on a triangle counts as far."""
+"""A triangle counts as far if its W is over this multiple of the least W of the frame."""
 
 
 @dataclass(frozen=True)

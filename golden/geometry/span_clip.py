@@ -49,8 +49,9 @@ class ClippedRows:
 
 @dataclass(frozen=True)
 class SpanClip:
-    """``x = max(begin, left) - left``, ``length = min(end, right) - max(begin, left)``.
+    """Cuts scanlines to the picture.
 
+    A scanline gets ``x = max(begin, left) - left`` and ``length = min(end, right) - max(begin, left)``.
     Scanlines above the picture, and scanlines without a pixel in it, are passed on with length 0. For these
     scanlines `SpanAttributes` steps down the long edge, and makes no span.
 

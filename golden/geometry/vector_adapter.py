@@ -50,15 +50,15 @@ class VectorSpans(PlacedSpans):
 
 @dataclass(frozen=True)
 class VectorAdapter:
-    """Words of `SpanVectors` from N/W at both ends of a span and its step: shifts and roundings alone.
+    """Makes words of `SpanVectors` from N/W at both ends of a span and from its step, by shifts and rounding.
 
     The components of both ends and of the step are shifted left by the same number of places, s. This is
     `SpanHalver.shift`, the number of bits that repeat the sign in all components of the ends. Then each word
-    x becomes ``x
-    - 2^-14 x``, cut. This leaves a margin of 8 steps of 2^-17 to 1. No pixel may reach 1, and nothing
-    saturates. The step is shifted left by e more places. e is the largest number up to 15 that leaves the
-    step under 1. If ``flip`` is set, the start is negated. If exactly one of ``flip`` and ``turned`` is set,
-    the step is negated. Both are rounded half up to 17 fraction bits.
+    loses the 2^-14th part of its value, cut: x becomes ``x - 2^-14 x``. This leaves a margin of 8 steps of
+    2^-17 to 1. No pixel may reach 1, and nothing saturates. The step is shifted left by e more places. e is
+    the largest number up to 15 that leaves the step under 1. If ``flip`` is set, the start is negated. If
+    exactly one of ``flip`` and ``turned`` is set, the step is negated. Both are rounded half up to 17
+    fraction bits.
 
     ========== ============ =====================================================================
     word       format       why

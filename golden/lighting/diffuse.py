@@ -12,7 +12,7 @@ __all__ = ["Diffuse"]
 
 @dataclass(frozen=True)
 class Diffuse:
-    """``max(N . L, 0)`` rounded half up to ``UQ(0, 17)``, saturated to ``1 - 2^-17``.
+    """Diffuse term: ``max(N . L, 0)``, rounded half up to ``UQ(0, 17)`` and saturated to ``1 - 2^-17``.
 
     The result has 17 bits, like the operands of the colour multipliers. Codes of unit vectors have the length
     ``ONE / 2^17``. So the term is too small by a relative 2^-16 (0.004 LSB of a full channel). The rounding

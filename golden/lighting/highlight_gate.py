@@ -39,7 +39,7 @@ class GateLimits:
 
 @dataclass(frozen=True)
 class HighlightGate(Gate):
-    """Whether a span may be lit, from ``a = N_l . H``, ``b = N_r . H`` and ``u = 1 - N_l . N_r``.
+    """Decides whether a span may be lit, from ``a = N_l . H``, ``b = N_r . H`` and ``u = 1 - N_l . N_r``.
 
     The largest ``N . H`` along the great circle from ``N_l`` to ``N_r``, psi apart, is inside the arc if
     ``b > a cos psi`` and ``a > b cos psi``. Else it is at an end. Inside it is
@@ -142,7 +142,7 @@ class HighlightGate(Gate):
 
     @property
     def threshold_format(self) -> Format:
-        """`level_format`."""
+        """Format of T, see `level_format`."""
         return self.level_format
 
     def thresholds_of(self, last_lit_arguments: np.ndarray) -> Fixed:

@@ -17,7 +17,7 @@ MAX_LIGHTS = 16
 
 @dataclass(frozen=True)
 class Intensity:
-    """``I = k_a I_a + sum_i I_i (k_d D_i + k_s S_i)`` for each channel, rounded half up, and saturated.
+    """Intensity of a channel: ``I = k_a I_a + sum_i I_i (k_d D_i + k_s S_i)``, rounded half up and saturated.
 
     The products ``k I`` are inputs, *colour operands* in LSB of the 8-bit channel. Their format is
     ``UQ(11, 6)``, 17 bits for the multipliers. So a term may reach 2047.98 LSB, eight times the full channel.

@@ -171,7 +171,7 @@ class Lobe(HighlightOperand):
 
     @property
     def table_options(self) -> dict[str, Any]:
-        """``banks``, ``cutoff`` and ``fixed``."""
+        """Options of the tables by name: ``banks``, ``cutoff`` and ``fixed``."""
         return {"banks": self.banks, "cutoff": self.cutoff, "fixed": self.fixed}
 
     def for_operand(self, operand: Any, scale: int = 0) -> "Lobe":

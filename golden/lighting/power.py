@@ -14,7 +14,7 @@ __all__ = ["Power"]
 
 @dataclass(frozen=True)
 class Power(HighlightOperand):
-    """``max(cos gamma, 0)^n`` for n of 10 bits, by squares and products over the bits of n.
+    """Specular term ``max(cos gamma, 0)^n`` for n of 10 bits, by squares and products over the bits of n.
 
     The unit computes with complements, ``x = 1 - c``. Near the peak c^n multiplies a relative error of c by
     n, and x keeps its digits there. Square and product are one operation, ``1 - (1-p)(1-q) = p + q - p q``.
@@ -62,7 +62,7 @@ class Power(HighlightOperand):
 
     @property
     def last_lit_arguments(self) -> np.ndarray:
-        """Argument with ``c^n = 2^-17``, because the result is never too large.
+        """Largest lit argument for each exponent: ``c^n = 2^-17``, because the result is never too large.
 
         A further step allows for the rounding of float64.
         """
@@ -108,5 +108,5 @@ class Power(HighlightOperand):
         return s
 
     def _combine(self, p: Fixed, q: Fixed) -> Fixed:
-        """``p + q - p q``."""
+        """Complement of the product of two complemented factors: ``p + q - p q``."""
         return (p + q - p.truncate(17) * q.truncate(17)).saturate(self.COMPLEMENT_FORMAT)

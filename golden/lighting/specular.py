@@ -73,12 +73,12 @@ def _lowered(function: Callable[[np.ndarray], np.ndarray], entries: int) -> np.n
 
 @dataclass(frozen=True)
 class Specular(HighlightOperand):
-    """``max(1 - k (1 - cos gamma), 0)^p`` with ``k = a n + b`` and p = 2, 4 or 8, by model and exponent n.
+    """Specular term of a model at exponent n: ``max(1 - k (1 - cos gamma), 0)^p`` and related curves.
 
-    ``cosquad_q`` reads k from a table of 1024 words; models of [Lyon93] square once, twice or three times.
-    ``exp`` is ``exp(-n (1 - cos gamma)) = 2^(-16 p)`` with ``p = k (1 - cos gamma)``, ``k = n log2(e)/16``.
-    The whole part of 16 p is a shift. Its fraction addresses a table of 64 values of ``2^-f``, and 11 bits
-    interpolate between them.
+    Most models have ``k = a n + b``. ``cosquad_q`` reads k from a table of 1024 words. p is 2, 4 or 8: models
+    of [Lyon93] square once, twice or three times. ``exp`` is ``exp(-n (1 - cos gamma)) = 2^(-16 p)`` with ``p
+    = k (1 - cos gamma)``, ``k = n log2(e)/16``. The whole part of 16 p is a shift. Its fraction addresses a
+    table of 64 values of ``2^-f``, and 11 bits interpolate between them.
 
     ``coscos2`` and ``coscos4`` are ``cos^k(a gamma)``, powers of a base ``cos(a gamma) = cos(pi/2 sqrt w)``
     with ``w = (2 a gamma / pi)^2``. They need no root and no arccos, because gamma^2 is smooth in cos gamma,
@@ -216,7 +216,7 @@ class Specular(HighlightOperand):
 
     @property
     def word_formats(self) -> dict[str, Format]:
-        """Argument, slope times argument, base, and powers of the base, see `HighlightOperand`."""
+        """Formats of argument, slope times argument, base, and powers of the base, see `HighlightOperand`."""
         # A cosine is squared in place of the base.
         names = ("square", "square_2", "square_3")[: 0 if self.is_coscos else self.squarings]
         squares = dict.fromkeys(names, self.BASE_FORMAT * self.BASE_FORMAT)

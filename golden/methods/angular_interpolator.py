@@ -19,10 +19,13 @@ __all__ = ["METHODS", "PUBLISHED", "AngularInterpolator"]
 
 @dataclass(frozen=True)
 class AngularInterpolator(EndNormalInterpolator):
-    """``1 - cos gamma`` with ``cos gamma(t) = cos beta cos(lambda - t psi)``, for L and H of each light.
+    """The operands N·L and 1 - N·H, from ``cos gamma(t) = cos beta cos(lambda - t psi)``.
 
-    Formats and error bounds are those of `AngularSetup` and `HighlightCosine`. N·L, ``SQ(2, 25)``, is 1 minus
-    the result. Spans over 150 degrees are flagged.
+    gamma is the angle between the normal and a fixed vector, L or H. beta is the angle of this vector to the
+    plane of the great circle. lambda is the angle from ``N_l`` to its projection on this plane.
+
+    Formats and error bounds are those of `AngularSetup` and `HighlightCosine`, whose result is ``1 - cos
+    gamma``. N·L is 1 minus the result for L, in ``SQ(2, 25)``. Spans over 150 degrees are flagged.
 
     Parameters
     ----------
@@ -74,7 +77,7 @@ class AngularInterpolator(EndNormalInterpolator):
         direction: Fixed,
         halfway: Fixed,
     ) -> Operands:
-        """Bit-accurate operands."""
+        """Bit-accurate operands of every pixel."""
         pixels = pixels_of(length)
 
         def complement(vector: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -101,4 +104,4 @@ PUBLISHED = {
     AngularInterpolator(AngularSetup("arccos", Arccos("as_published"))): "as the thesis prints it",
     AngularInterpolator(AngularSetup("arccos", Arccos("corrected"))): "as printed, the arccosine corrected",
 }
-"""The method with the arccosine of table 3.1, as printed and with its misprint corrected."""
+"""The method with the arccosine of table 3.1: as printed, and with the misprint corrected."""

@@ -65,7 +65,7 @@ class BisectionInterpolator(NormalInterpolator):
 
     @property
     def divides_spans(self) -> bool:
-        """``True``: a span of several segments takes longer."""
+        """``True``: a span of several segments takes more cycles."""
         return True
 
     @property

@@ -19,7 +19,7 @@ __all__ = ["METHODS", "LinearInterpolator"]
 
 @dataclass(frozen=True)
 class LinearInterpolator(NormalInterpolator):
-    """``(1-t) N_l + t N_r`` by a first difference.
+    """Normals ``(1-t) N_l + t N_r``, by a first difference.
 
     A normal is too short, by ``1 - cos(psi/2)`` in the middle of the span. Components of ``N_r - N_l``
     saturate at 1. This can happen only in spans over 60 degrees; the span is then flagged.
@@ -47,7 +47,7 @@ class LinearInterpolator(NormalInterpolator):
 
     @property
     def lights_cut(self) -> bool:
-        """``False``: see `cut`."""
+        """``False``: spans are cut by their angle alone."""
         return False
 
     def cut(self, cutter: SpanCutter) -> tuple[Raster, int]:
@@ -70,7 +70,7 @@ class LinearInterpolator(NormalInterpolator):
         return float(np.cos(np.radians(self.gate_angle / 2))) - CODE_LENGTH_ERROR
 
     def operand_error(self, length: int, degrees: float) -> float:
-        """`difference_rounding`, plus ``2^-17 |P|`` for the error of ``1/(m-1)``."""
+        """Error of a normal: `difference_rounding`, plus ``2^-17 |P|`` for the error of ``1/(m-1)``."""
         half = np.radians(degrees) / 2
         return float(difference_rounding(length) + COMPONENT.step * (2 * np.sin(half) + COMPONENT.step))
 

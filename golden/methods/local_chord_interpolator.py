@@ -29,7 +29,7 @@ __all__ = ["METHODS", "LocalChordInterpolator"]
 
 @dataclass(frozen=True)
 class LocalChordInterpolator(Interpolator):
-    """``N . L`` and ``u = |N - H|^2 / 2`` of each pixel by two additions each, with L and H of the pixel.
+    """Operands ``N . L`` and ``u = |N - H|^2 / 2`` with L and H of the pixel itself, by two additions each.
 
     A span brings three values of N·L and three of u: at the first pixel centre, in the middle and at the last
     pixel centre. The source of the spans, which knows positions, computes these values. `ChordSetup` computes
@@ -122,7 +122,7 @@ class LocalChordInterpolator(Interpolator):
 
     @property
     def value_setup(self) -> ChordSetup:
-        """`setup`."""
+        """The setup of the method, see `setup`."""
         return self.setup
 
     def matched(self, specular: HighlightOperand | None) -> "LocalChordInterpolator":
@@ -148,7 +148,7 @@ class LocalChordInterpolator(Interpolator):
 
     @property
     def given_values(self) -> bool:
-        """``True``: see `serves_local`."""
+        """``True``: spans bring three values of N·L and u of each light."""
         return True
 
     @property
@@ -161,32 +161,32 @@ class LocalChordInterpolator(Interpolator):
         return replace(self, fraction_bits=fraction_bits)
 
     def shortest_words(self, longest: int) -> int | None:
-        """See `Interpolator.shortest_words`."""
+        """Fraction bits of the differences that are enough, see `Interpolator.shortest_words`."""
         serving = (bits for bits in self.word_choices if longest <= ChordSetup(bits).longest)
         bits = min(serving, default=self.fraction_bits)
         return bits if bits < self.fraction_bits else None
 
     def input_lines(self, lights: int, highlights: bool, factors: Sequence[int]) -> list[str]:
-        """Values, see `Interpolator.input_lines`."""
+        """Lines that describe the values of a span, see `Interpolator.input_lines`."""
         diffuse, highlight = ChordSetup.DIFFUSE_FORMAT, ChordSetup.HIGHLIGHT_FORMAT
         lines = [
             f"i_values: a light's three codes of N.L, {diffuse}, and three of 1 - N.H, {highlight},",
             "times (1 - 2^-17)^2: at the first pixel, the middle, the last pixel; no L and H are read",
         ]
         if self.scale:
-            lines.append(f"1 - N.H is times {1 << self.scale}, and 1 at most; so it is in the table")
+            lines.append(f"1 - N.H is times {1 << self.scale}, at most 1, also as argument of the table")
         if factors:
             one = len(factors) == 1
             lines += [
                 f"i_factors: three codes of the factor a, 0 to 1, in {diffuse}, times (1 - 2^-17)^2, of "
                 f"light{'' if one else 's'} {', '.join(map(str, factors))}, which fade{'s' if one else ''};",
-                "their N.L in i_values is times a",
+                "their N.L in i_values is multiplied by a",
             ]
         return lines
 
     @property
     def lights_cut(self) -> bool:
-        """``True``: see `cut`."""
+        """``True``: a light cuts spans where its quadratics miss their tolerances."""
         return True
 
     def geometry(self, lights: int) -> Geometry:

@@ -81,21 +81,21 @@ class EndNormalInterpolator(Interpolator):
 
     @property
     def brings_ends(self) -> bool:
-        """``True``."""
+        """``True``: spans bring unit normals at both ends."""
         return True
 
     def input_lines(self, lights: int, highlights: bool, factors: Sequence[int]) -> list[str]:
-        """Unit vectors, see `Interpolator.input_lines`."""
+        """Line that describes the codes of unit vectors, see `Interpolator.input_lines`."""
         return ["i_normal_*, L and H: unit vectors in SQ(1, 17), code = component (2^17 - 1)"]
 
     @property
     def lights_cut(self) -> bool:
-        """``True``: see `cut`."""
+        """``True``: the curve has an error, so each light may cut spans."""
         return True
 
     @property
     def light_meanings(self) -> LightMeanings:
-        """Unit vectors."""
+        """Texts for L and H: unit vectors."""
         return UNIT_VECTORS
 
     def gate(self, specular: HighlightOperand) -> Gate:
@@ -189,11 +189,11 @@ class NormalInterpolator(EndNormalInterpolator):
 
     @property
     def highlight_excess(self) -> float:
-        """`normal_error`; with half the squared chord twice this error, as ``|N - H| <= 2``, plus the cut.
+        """Bound of the excess of N·H: `normal_error`, or more with half the squared chord.
 
-        Let r be the length of the curve and c the cosine to H. Half the squared chord is
-        ``(1 - r)^2/2 + r (1 - c)``, at least ``r (1 - c)``. The lengths of the codes of N_l and H differ from
-        1.
+        With half the squared chord it is twice `normal_error`, because ``|N - H| <= 2``, plus the cut. Let r
+        be the length of a normal on the curve and c its cosine to H. Half the squared chord is ``(1 - r)^2/2
+        + r (1 - c)``, at least ``r (1 - c)``. The lengths of the codes of N_l and H differ from 1.
         """
         if not self.uses_chord:
             return self.normal_error
@@ -249,6 +249,6 @@ class NormalInterpolator(EndNormalInterpolator):
         direction: Fixed,
         halfway: Fixed,
     ) -> Operands:
-        """Bit-accurate operands: products of the normals."""
+        """Bit-accurate operands of every pixel: products of the normals with L and H."""
         normals, out_of_range = self.normals(normal_left, normal_right, length)
         return Operands(*self.products(normals, direction, halfway), out_of_range)

@@ -90,7 +90,7 @@ class QuotientInterpolator(Interpolator):
 
     @property
     def light_meanings(self) -> LightMeanings:
-        """L in the frame of the light; there H is z."""
+        """Texts for L in the frame of the light, where H is z."""
         return LightMeanings("sin a, 0, cos a of the light's frame", "not read", "2^17 - 2")
 
     def matched(self, specular: HighlightOperand | None) -> "QuotientInterpolator":
@@ -105,7 +105,7 @@ class QuotientInterpolator(Interpolator):
         return QuotientLobe(specular.reflection, **specular.table_options)
 
     def input_lines(self, lights: int, highlights: bool, factors: Sequence[int]) -> list[str]:
-        """Vectors and their frames, see `Interpolator.input_lines`."""
+        """Lines that describe vectors and their frames, see `Interpolator.input_lines`."""
         model = self.spans(lights, highlights)
         mirrored = (
             ["y_k is times cos a of light k; s0 is y of light 0 times its sin a."] if model.mirror else []
@@ -161,7 +161,7 @@ class QuotientInterpolator(Interpolator):
         return light_frames(scene, 1)[0].axes_for(highlights) if lights else None
 
     def cut(self, cutter: SpanCutter) -> tuple[Raster, int]:
-        """Spans whose ends differ in length by `LARGEST_RATIO` at most."""
+        """Spans cut until N/W at one end is at most `LARGEST_RATIO` times as long as at the other end."""
         return cutter.by_ends(self.LARGEST_RATIO)
 
     def least_cut(self, cutter: SpanCutter) -> Raster:

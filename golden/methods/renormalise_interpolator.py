@@ -23,7 +23,7 @@ __all__ = ["METHODS", "RenormaliseInterpolator"]
 
 @dataclass(frozen=True)
 class RenormaliseInterpolator(NormalInterpolator):
-    """``(1-t) m_l N_l + t m_r N_r``, divided by its length at every pixel: the baseline.
+    """Vectors of the true line, ``(1-t) m_l N_l + t m_r N_r``, divided by their lengths: the baseline.
 
     A span carries the two ends with their lengths, relative to the larger length. The lengths include
     ``1/W``. So the line between the ends is the true line on the screen, and no span is cut for its angle.
@@ -74,11 +74,11 @@ class RenormaliseInterpolator(NormalInterpolator):
 
     @property
     def lights_cut(self) -> bool:
-        """``False``: see `cut`."""
+        """``False``: the curve is exact, so no light cuts a span."""
         return False
 
     def input_lines(self, lights: int, highlights: bool, factors: Sequence[int]) -> list[str]:
-        """Ends of the true line, see `Interpolator.input_lines`."""
+        """Line that describes the ends of the true line, see `Interpolator.input_lines`."""
         return [
             "i_normal_*: ends of the line that is linear on the screen, N/W; the longer has length 1, "
             f"in {self.END_FORMAT}; pixels whose vector has every component under 1/256 are wrong, and "
@@ -112,7 +112,7 @@ class RenormaliseInterpolator(NormalInterpolator):
         return DifferenceAccumulator(self.END_FORMAT, format, format, self.END_FORMAT)
 
     def operand_error(self, length: int, degrees: float) -> float:
-        """Bound for ends of unit length.
+        """Bound of the error of N·L and of N·H, for ends of unit length.
 
         The bound is the error of the line divided by the line's shortest length, plus the renormaliser's
         error.

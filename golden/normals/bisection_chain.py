@@ -157,7 +157,7 @@ class BisectionChain:
         return total.round_half_up(17).saturate(self.FORMAT), out_of_range
 
     def _scaled(self, half: Fixed, e: Fixed) -> Fixed:
-        """``2 half (1/2 + e)``."""
+        """Product of a word and the factor of `Bisection`: ``2 half (1/2 + e)``."""
         operand = half.truncate(17).saturate(COMPONENT)
         total = half + (operand * e).scale(1).truncate(21)
         return total.round_half_up(20).saturate(self.WEIGHT_FORMAT)

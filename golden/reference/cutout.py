@@ -6,7 +6,8 @@ from blysk.golden.reference.scene import Scene
 
 __all__ = ["dropped_fragments"]
 
-# Rounding of a sum of shares; smaller alphas than the cutoff by this are equal to the cutoff.
+# Bound for the rounding of a sum of shares. An alpha counts as equal to the cutoff if it is less by this
+# bound at most.
 _ROUNDED = 2.0**-40
 
 
@@ -15,8 +16,9 @@ def dropped_fragments(
 ) -> np.ndarray:
     """Whether fragments have a smaller alpha than the cutoff of their material.
 
-    Alpha is that of the material, times that of the vertices, times that of the texture. Both are sampled as
-    the albedo is: perspective-correct, with the texture's filter, wrap modes and level.
+    Alpha is the product of the alpha of the material, of the vertices and of the texture. Vertices and
+    texture are sampled as for the albedo: perspective-correct, with the texture's filter, wrap modes and
+    level.
 
     Parameters
     ----------

@@ -106,8 +106,8 @@ def normalise(vectors: ArrayLike) -> np.ndarray:
         ``v / |v|``, or 0 where ``|v|`` is 0.
     """
     vectors = np.asarray(vectors, dtype=np.float64)
-    # Scaling by the largest component first keeps tiny and huge vectors from under- and overflow.
-    # A maximum of columns takes a quarter of the time of one along a short axis.
+    # Scaling by the largest component first keeps tiny and huge vectors from under- and overflow. A maximum
+    # of columns takes a quarter of the time of a maximum along a short axis.
     largest = reduce(np.maximum, np.moveaxis(np.abs(vectors), -1, 0))[..., np.newaxis]
     scaled = np.divide(vectors, largest, out=np.zeros_like(vectors), where=largest > 0)
     length = np.sqrt(np.einsum("...i,...i->...", scaled, scaled))[..., np.newaxis]

@@ -394,7 +394,7 @@ def intensity_of_cosines(
     material, lights, ambient_light, model
         As for `intensity`. Only colours of lights are read, and their directions for Fresnel's reflection.
     cosine, highlight_cosine : arrays, shape (..., lights)
-        N·L, for a light that fades times its factor; and N·H.
+        N·L, which contains the factor of a light that fades, and N·H.
     viewer : array, shape (3,), optional
         Unit vector V to a distant viewer, for Fresnel's reflection.
     factor : array, shape (..., lights), optional

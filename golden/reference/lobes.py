@@ -127,7 +127,7 @@ class TrowbridgeReitz(MicrofacetModel):
 
 @dataclass(frozen=True, repr=False)
 class Beckmann(MicrofacetModel):
-    """``D = exp(-tan^2 gamma / alpha^2) / (pi alpha^2 c^4)``, with ``c = cos gamma``.
+    """Beckmann: ``D = exp(-tan^2 gamma / alpha^2) / (pi alpha^2 c^4)``, with ``c = cos gamma``.
 
     Up to ``alpha = 1/sqrt 2`` (roughness 0.84) D is largest at c = 1, and falls with c. For a larger alpha D
     is largest at ``c^2 = 1/(2 alpha^2)``, where it is ``4 alpha^2 exp(1/alpha^2 - 2) / pi``, up to 1.47 times
@@ -338,7 +338,7 @@ def _alpha(roughness: float) -> float:
 
 
 def _energy_of_ggx(roughness: float) -> float:
-    """``1 / (4 pi I)`` with ``I = (z - ln(1 + z)) / (2 z^2)``, ``z = (1 - alpha^2) / (2 alpha^2)``."""
+    """Factor ``1 / (4 pi I)`` with ``I = (z - ln(1 + z)) / (2 z^2)``, ``z = (1 - alpha^2) / (2 alpha^2)``."""
     alpha = _alpha(roughness)
     z = (1 - alpha) * (1 + alpha) / (2 * alpha * alpha)
     # Near z = 0 the difference has lost its digits. The series is off by less than z^3 / 10.
@@ -347,7 +347,7 @@ def _energy_of_ggx(roughness: float) -> float:
 
 
 def _energy_of_beckmann(roughness: float) -> float:
-    """1 over the integral of S, which is the integral of D divided by its peak.
+    """Energy factor: 1 over the integral of S, which is the integral of D divided by its peak.
 
     With ``t = 1/w - 1`` and ``D = exp(-t/alpha^2) / (pi alpha^2 w^2)`` the integral of D is
     ``4 / alpha^2 integral_0^1 exp(-t/alpha^2) (2/(1 + t) - 1) dt``. The part with t over 40 alpha^2 is under

@@ -217,7 +217,7 @@ class PolynomialModel(ReflectionModel):
 
 @dataclass(frozen=True, repr=False)
 class AngleCosine(ReflectionModel):
-    """``cos^k(a gamma)`` where ``a gamma <= pi/2``, else 0 ([T] 3.1).
+    """Power of a cosine of ``a gamma``: ``cos^k(a gamma)`` where ``a gamma <= pi/2``, else 0 ([T] 3.1).
 
     Parameters
     ----------

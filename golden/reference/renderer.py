@@ -356,7 +356,7 @@ def shade_operands(
         The fragments; span, pixel, visible and triangle are used. An albedo needs all that `fragment_albedo`
         reads.
     cosine, highlight_cosine : arrays, shape (fragments, lights)
-        N·L, for a light that fades times its factor; and N·H.
+        N·L, which contains the factor of a light that fades, and N·H.
     model : ReflectionModel
         Reflection model.
     factor : array, shape (fragments, lights), optional

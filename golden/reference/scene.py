@@ -121,7 +121,7 @@ class Scene:
 
     @cached_property
     def textures(self) -> dict[int, Texture]:
-        """Textures by the index of their material, of materials that faces have."""
+        """Texture of each material that faces have and that has a texture, by the material's index."""
         given = {index: of.texture for index, of in enumerate(self.materials) if of.texture is not None}
         used = np.unique(self.mesh.material).tolist() if given else []
         return {index: given[index] for index in used if index in given}
@@ -133,7 +133,7 @@ class Scene:
 
     @property
     def cutoffs(self) -> dict[int, Material]:
-        """Materials with a cutoff by their index, of materials that faces have."""
+        """Each material that faces have and that has a cutoff, by its index."""
         given = {index: of for index, of in enumerate(self.materials) if of.cutoff is not None}
         used = np.unique(self.mesh.material).tolist() if given else []
         return {index: given[index] for index in used if index in given}

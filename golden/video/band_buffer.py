@@ -56,10 +56,10 @@ class BandBuffer:
         height = self.mode.vertical.visible
         if self.lines < 2 or self.lines & (self.lines - 1) or height % self.lines or height < 4 * self.lines:
             raise ValueError(
-                f"a band has 2, 4, 8, ... lines, and {height} lines are four bands or more of them"
+                f"a band must have 2, 4, 8, ... lines, and {height} lines must be four bands or more"
             )
         if not all(4 <= bits <= 8 for bits in self.colour_bits):
-            raise ValueError("a channel is kept by 4 to 8 bits")
+            raise ValueError("a buffer must keep 4 to 8 bits of each channel")
         if not all(0 <= channel <= 255 for channel in self.background):
             raise ValueError("channels of the background are 0 to 255")
 

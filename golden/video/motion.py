@@ -47,8 +47,11 @@ class Motion:
     mirror images. An entry takes two products. Their sum with c0 is rounded to 20 fraction bits for offsets,
     to 16 for the other entries.
 
-    The error of an entry is at most `ENTRY_ERROR`. It is the sum of 2^-17 each for sine and cosine, times
-    coefficients below 2; 2^-17 each for c1 and c2; 2^-21 for c0; and half a step for the rounding.
+    The error of an entry is at most `ENTRY_ERROR`. It is the sum of:
+
+    - 2^-17 for the sine and 2^-17 for the cosine, times coefficients below 2;
+    - 2^-17 for c1, 2^-17 for c2, and 2^-21 for c0;
+    - half a step for the rounding.
 
     Parameters
     ----------

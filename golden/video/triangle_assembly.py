@@ -16,7 +16,7 @@ COUNTERS = ("sent", "rejected", "outside")
 
 @dataclass(frozen=True)
 class TriangleAssembly:
-    """Triangles with no corner outside that may cover the centre of a scanline of the band.
+    """Chooses triangles that have no corner outside, and may cover the centre of a scanline of the band.
 
     A triangle is *rejected* if no scanline from ``top`` to ``bottom - 1`` has its centre between the highest
     corner, included, and the lowest, excluded. These are exactly the triangles that `VertexSort` would find

@@ -74,7 +74,7 @@ class ScreenVertices:
 
 @dataclass(frozen=True)
 class VertexTransform:
-    """``x = X/W``, ``y = Y/W``, ``1 - 1/W`` and ``N/W`` of vertices by a matrix.
+    """Transforms vertices by a matrix: place ``x = X/W``, ``y = Y/W``, depth ``1 - 1/W``, and ``N/W``.
 
     W is in units of the near plane's distance, so it is 1 on the near plane. A vertex with W under 1, or with
     W of `FAR` or more, is outside. X/W and Y/W are in units of ``2^scale_bits`` pixels from the middle of the
@@ -108,7 +108,7 @@ class VertexTransform:
     Parameters
     ----------
     scale_bits : int
-        Logarithm to base 2 of the pixels of 1 in X/W, 4 to 11. 9 is for pictures up to 1024 pixels wide.
+        1 in X/W is ``2^scale_bits`` pixels; 4 to 11. 9 is for pictures up to 1024 pixels wide.
     grid : Grid
         Fraction bits of the coordinates.
 
@@ -190,7 +190,7 @@ class VertexTransform:
         )
 
     def _normals(self, normal: np.ndarray, matrix: Matrix) -> Fixed:
-        """``R N``, shape (V, 3), `COMPONENT`, -ONE to ONE."""
+        """Turned normals ``R N``, shape (V, 3), in `COMPONENT`, -ONE to ONE."""
         products = [
             Fixed(COMPONENT, normal[:, k, np.newaxis]) * Fixed(ENTRY, matrix.normal[:, k]) for k in range(3)
         ]

@@ -46,7 +46,7 @@ class _ColorProductUnit(PipelinedUnit):
         )
 
     def datapath(self, m, operands):
-        """The graph, read at the stage of its last word."""
+        """Describe the registers of the graph, and read its results in the last stage."""
         at = self._graph.build(m, self, operands)
         result = Signal(self.o.payload.shape())
         m.d.comb += [
@@ -64,10 +64,10 @@ def _rounded(product):
 class AlbedoUnit(wiring.Component):
     """Albedo of every pixel of spans, first pixel first; `Albedo` is the bit-accurate model.
 
-    Spans become words of pixels, words become vertex colours and texture coordinates, and a sampler takes
-    coordinates to colours of the texture. With both colours the vertex colour waits in a FIFO for its texel,
-    and a unit multiplies them. At an initiation interval of 1 a pixel leaves on each cycle. A span of length
-    0 gives nothing.
+    Spans become words of pixels. Words become vertex colours and texture coordinates. A sampler makes colours
+    of the texture from coordinates. If there are both colours, the vertex colour waits in a FIFO for the
+    colour of the texture, and a unit multiplies them. At an initiation interval of 1 a pixel leaves on each
+    cycle. A span of length 0 gives nothing.
 
     Parameters
     ----------
@@ -134,7 +134,7 @@ class AlbedoUnit(wiring.Component):
         super().__init__(members)
 
     def elaborate(self, platform):
-        """The units in a row; with both colours, a FIFO beside the sampler."""
+        """The units one after the other; if there are both colours, also a FIFO beside the sampler."""
         m = Module()
         m.submodules.spans, m.submodules.attributes = self._spans, self._attributes
         connect(m, wiring.flipped(self.i), self._spans.i)
@@ -165,7 +165,7 @@ class AlbedoUnit(wiring.Component):
         return m
 
     def _multiply(self, m: Module, found: stream.Interface) -> None:
-        """A pixel goes on to the sampler and to the FIFO on the same cycle, and both meet at the product."""
+        """Pixels go to the sampler and to the FIFO on the same cycle. Their outputs meet at the product."""
         sampler = self._sampler
         m.submodules.product = product = self._product
         color = stream.Signature(albedo_shape())

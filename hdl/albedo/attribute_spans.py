@@ -77,7 +77,7 @@ def attribute_span_shape(model: AttributeSpans, length_bits: int = LENGTH_BITS) 
 def attribute_words_shape(model: AttributeSpans) -> data.StructLayout:
     """Shape of the words of a pixel: ``colors``, ``coordinates``, ``weight``, ``base``, ``range``, ``level``.
 
-    Members that the model has not are left out.
+    Members that the model lacks are left out.
 
     Parameters
     ----------

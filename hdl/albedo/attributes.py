@@ -42,7 +42,7 @@ def attributes_shape(model: Attributes) -> data.StructLayout:
 
 
 class AttributesUnit(PipelinedUnit):
-    """``A = U/w`` of every attribute of a pixel: vertex colours, and texture coordinates in texels.
+    """Attributes of a pixel, ``A = U/w``: vertex colours, and texture coordinates in texels.
 
     `Attributes`, the bit-accurate model, has formats, table and error bounds.
 
@@ -82,7 +82,7 @@ class AttributesUnit(PipelinedUnit):
         )
 
     def datapath(self, m, operands):
-        """The graph, read at the stage of its last word."""
+        """Describe the registers of the graph, and read its results in the last stage."""
         at = self._graph.build(m, self, operands)
         result = Signal(self.o.payload.shape())
         for name in result.shape().members:
@@ -208,7 +208,7 @@ class AttributesUnit(PipelinedUnit):
         return rest, g.register("halves", halves, address), bend
 
     def _color(self, name: str, word: Word) -> Word:
-        """Word of a colour, from the word of its quotient, or without perspective from that of its line."""
+        """Word of a colour, from its quotient, or without perspective from its line."""
         p, g = self.model, self._graph
         if not p.spans.perspective:
             word = g.register(f"{name}_inside", lambda u: u.saturate(UQ(0, 23)), word)

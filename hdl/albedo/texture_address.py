@@ -85,7 +85,7 @@ class TextureAddressUnit(PipelinedUnit):
         )
 
     def datapath(self, m, operands):
-        """The graph, read at the stage of its last word."""
+        """Describe the registers of the graph, and read its results in the last stage."""
         descriptor, bits = self.constants, self.model.memory.address_bits
         # First word behind level 0, counted from the base.
         self._behind = Signal(bits, name="behind")

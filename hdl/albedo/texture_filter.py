@@ -73,7 +73,7 @@ class TextureFilterUnit(PipelinedUnit):
         )
 
     def datapath(self, m, operands):
-        """The graph, read at the stage of its last word."""
+        """Describe the registers of the graph, and read its results in the last stage."""
         at = self._graph.build(m, self, operands)
         result = Signal(self.o.payload.shape())
         m.d.comb += [
@@ -160,7 +160,7 @@ class TextureFilterUnit(PipelinedUnit):
         return self._sum(register, difference, weight, start, _ROW)
 
     def _sum(self, register, difference, weight, start, fraction_bits):
-        """``start + w difference``. The difference has ``fraction_bits``."""
+        """Sum ``start + w difference``, where w is the weight. The difference has ``fraction_bits``."""
         weight = register(weight, "weight")
         cut = fraction_bits + self.model.share_bits - _MEAN
         product = register((difference * weight)[cut : cut + _MEAN + 1].as_signed(), "product")

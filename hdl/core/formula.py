@@ -142,7 +142,7 @@ class Formula(FixedValue):
         return component(self, index)
 
     def scale(self, exponent: int) -> "Formula":
-        """Times a power of two."""
+        """Formula of the value times a power of two."""
         if exponent == 0:
             return self
         if exponent == -1:

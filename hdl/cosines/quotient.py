@@ -40,7 +40,7 @@ def pixel_words_shape(spans: QuotientSpans) -> data.StructLayout:
 
 
 def quotients_shape(model: Quotient) -> data.StructLayout:
-    """Shape of N·L and a place for each light, ``out_of_range``, and ``span``, the bit of the pixel.
+    """Shape of a result: N·L and a place for each light, ``out_of_range``, and ``span``, the pixel's bit.
 
     Parameters
     ----------
@@ -96,7 +96,7 @@ class QuotientUnit(PipelinedUnit):
         )
 
     def datapath(self, m, operands):
-        """The graph, read at the stage of its last word."""
+        """Describe the registers of the graph, and read its results in the last stage."""
         at = self._graph.build(m, self, operands)
         result = Signal(self.o.payload.shape())
         m.d.comb += [result.span.eq(at(self._results["span"], self.latency))]

@@ -415,7 +415,7 @@ class QuotientSpansUnit(wiring.Component):
 
     @staticmethod
     def _few_of(length: Value) -> Value:
-        """Whether a span has two pixels or more, at most two, and at most three."""
+        """Three bits: whether a span has at least two pixels, at most two pixels, at most three pixels."""
         return Cat(length[1:].any(), ~length[2:].any() & ~length[:2].all(), ~length[2:].any())
 
     def _line(
@@ -451,10 +451,10 @@ class QuotientSpansUnit(wiring.Component):
         # Whether at most one, two, three pixels of a span are left, counting the pixel on the output.
         last, two, three = (Signal(name=name, init=1) for name in ("last", "two_left", "three_left"))
         left, valid = Signal(self.length_bits, name="left"), Signal(name="valid")
-        # Whether second and first differences of the next span were taken, and whether they may be.
+        # Whether second and first differences of the next span were taken, and whether they may be taken.
         has_second, self._ready = Signal(name="has_second"), Signal(name="ready")
         may_second, may_first = Signal(name="may_second", init=1), Signal(name="may_first")
-        # The waiting start's span: whether it has two pixels or more, at most two, and at most three.
+        # The span of the waiting start: whether it has at least two pixels, at most two, at most three.
         is_long, at_most_two, at_most_three = self._few
         m.d.comb += [
             takes[0].eq(waits[0] & may_second),

@@ -44,9 +44,9 @@ class RecurrenceUnit(wiring.Component):
     Members
     -------
     i : :py:`In(stream.Signature(StructLayout({"diffuse", "highlight", "coefficient", "shift", "length"})))`
-        For each cosine ``first`` and ``second`` in `Recurrence.state_format`: x(0), and x(1) - x(0) in
-        ``reinsch``, x(1) in ``direct``. If interleaved, they are arrays of four, see `Recurrence.start`.
-        The coefficient, the shift (only in ``reinsch``), and the length, 0 to 4095.
+        For each cosine ``first`` and ``second`` in `Recurrence.state_format`. ``first`` is x(0). ``second``
+        is x(1) - x(0) in ``reinsch``, and x(1) in ``direct``. If interleaved, they are arrays of four, see
+        `Recurrence.start`. The coefficient, the shift (only in ``reinsch``), and the length, 0 to 4095.
     o : :py:`Out(stream.Signature(StructLayout({"diffuse", "highlight", "last"})))`
         Both cosines in `Recurrence.result_format`. ``last``: the pixel is the last of its span.
 

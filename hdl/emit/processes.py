@@ -27,9 +27,10 @@ for number in running:
 
 
 class _Guard:
-    """A small process that reads from a pipe which process groups run. It kills them when the pipe closes.
+    """A small process that guards process groups: it kills them when a pipe from this process closes.
 
-    If this process ends, the system closes the pipe, even after SIGKILL.
+    The guard reads the numbers of the groups that run from this pipe. If this process ends, the system closes
+    the pipe, even after SIGKILL.
     """
 
     def __init__(self) -> None:

@@ -223,7 +223,7 @@ def _yosys(netlist: str) -> str:
 
 
 def _plain_identifiers(text: str) -> str:
-    r"""Replace every escaped identifier (``\a.b[0]``) by a plain one that the text does not use yet."""
+    r"""Replace every escaped identifier (``\a.b[0]``) by a plain name that the text does not use yet."""
     token = re.compile(r'"(?:\\.|[^"\\])*"|\\(\S+)\s|[A-Za-z_][A-Za-z0-9_$]*')
     taken = {match[0] for match in token.finditer(text) if not match[1]}
     plain: dict[str, str] = {}

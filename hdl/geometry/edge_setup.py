@@ -15,7 +15,7 @@ from blysk.hdl.geometry.triangles import first_centre, tag_shape
 __all__ = ["EdgeSetupUnit", "edge_corners_shape", "edges_shape", "plane_corners_shape"]
 
 _DIVISORS = (0, "divisor"), (1, "triple")
-"""Number k and name of the registers of a divisor and its triple, which have 2 k bits more than a divisor."""
+"""For a divisor and its triple: k, and the name of the registers. These have 2 k bits more than a divisor."""
 
 ALONG_BITS = 9
 """Bits of `Edges.along`, 0 to 511: 256 n minus b's fraction, which is over 0 if n is 2 (see `EdgeSetup`)."""

@@ -144,7 +144,7 @@ class GradientSetupUnit(PipelinedUnit):
         }
 
     def datapath(self, m, operands):
-        """The graph, read at the stage of its last words."""
+        """Describe the registers of the graph, and read its results in the last stage."""
         value = self._graph.build(m, self, operands)
         result = Signal(self.o.payload.shape(), name="result")
         for name, word in self._results.items():

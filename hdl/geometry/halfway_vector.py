@@ -41,9 +41,10 @@ class HalfwayVectorUnit(wiring.Component):
         super().__init__({"i": In(stream.Signature(given)), "o": Out(stream.Signature(made))})
 
     def elaborate(self, platform):
-        """Half of the sum has the same bits as the sum, with another binary point.
+        """The sum of L and V, and the normaliser of half of the sum.
 
-        If L and V are opposite, the normaliser finds no direction (``lost``), and H is 0.
+        Half of the sum has the same bits as the sum, with another binary point. If L and V are opposite, the
+        normaliser finds no direction (``lost``), and H is 0.
         """
         m = Module()
         m.submodules.normaliser = normaliser = self._normaliser

@@ -15,7 +15,7 @@ from blysk.hdl.geometry.vector_adapter import vector_spans_shape
 __all__ = ["LightAdapterUnit", "with_components"]
 
 _AXES = 3
-"""Components of a vector."""
+"""Number of components of a vector of geometry."""
 
 _LOW = LIGHT_STRIDE.bit_length() - 1
 """Bits of an address within a light."""

@@ -173,7 +173,7 @@ class PlaneSetupUnit(PipelinedUnit):
         }
 
     def datapath(self, m: Module, operands):
-        """The graph, read at the stage of its last words."""
+        """Describe the registers of the graph, and read its results in the last stage."""
         self._module = m
         value = self._graph.build(m, self, operands)
         result = Signal(self.o.payload.shape(), name="result")

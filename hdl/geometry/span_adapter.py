@@ -39,7 +39,7 @@ class LineAdapterUnit(PipelinedUnit):
         super().__init__(pieces_shape(), line_spans_shape(), latency=3)
 
     def datapath(self, m, operands):
-        """Shared bits, shared shift, sign, rounding."""
+        """Three stages: used bits of the components, shared shift, sign and rounding."""
         p, bits = LineAdapter(), SPAN_NORMAL.fraction_bits
         codes = [Value.cast(operands[side][k]).as_signed() for side in ("left", "right") for k in range(3)]
         names = [name for name in self.o.payload.shape().members if not name.startswith("normal")]

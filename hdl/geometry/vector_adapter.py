@@ -57,7 +57,7 @@ class VectorAdapterUnit(PipelinedUnit):
         super().__init__(halved_spans_shape(surface), vector_spans_shape(surface), latency=4)
 
     def datapath(self, m, operands):
-        """Shared shift; margin; the step's bits and shift; sign, rounding."""
+        """Four stages: shared shift; margin and the step's used bits; the step's shift; sign and rounding."""
         p, bits = self.model, SPAN_NORMAL.fraction_bits
         start, step = (
             [Value.cast(operands[name][k]).as_signed() for k in range(3)] for name in ("start", "step")

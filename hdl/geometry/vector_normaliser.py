@@ -288,7 +288,7 @@ class SharedVectorNormaliserUnit(PipelinedUnit):
         return self._graph.share("last", operands, 3, last)
 
     def datapath(self, m, operands):
-        """The graph, read at the stage of its last words."""
+        """Describe the registers of the graph, and read its results in the last stage."""
         value = self._graph.build(m, self, operands)
         result = Signal(self.o.payload.shape(), name="result")
         m.d.comb += [
@@ -329,7 +329,7 @@ def _offset(rest: Value) -> Value:
 
 
 def _root(p: VectorNormaliser, c0: Value, product: Value) -> Value:
-    """``f = c0 - c1 u``."""
+    """Factor ``f = c0 - c1 u`` of the reciprocal root."""
     point = p.OFFSET_FORMAT.fraction_bits + p.C1_FORMAT.fraction_bits
     return (c0 - (product >> (point - p.C0_FORMAT.fraction_bits)))[: p.C0_FORMAT.width]
 

@@ -39,7 +39,7 @@ def _limited(light: FixedValue, model: Intensity) -> FixedValue:
 
 
 class ColoredIntensityUnit(IntensityUnit):
-    """``I = a (k_a I_a + sum_i I_i k_d D_i) + E + sum_i I_i k_s S_i`` for each channel; a is the albedo.
+    """Intensity ``I = a (k_a I_a + sum_i I_i k_d D_i) + E + sum_i I_i k_s S_i`` of a channel; a: albedo.
 
     Formats and error are those of the bit-accurate model `Intensity` with ``has_albedo``. With ``tints`` the
     constant ``tinted`` moves the specular sum into the brackets.

@@ -9,12 +9,13 @@ __all__ = ["DiffuseUnit"]
 
 
 class DiffuseUnit(PipelinedUnit):
-    """``max(N . L, 0)`` rounded half up to ``UQ(0, 17)``, saturated. `Diffuse` is the bit-accurate model.
+    """Diffuse term of one light. `Diffuse` is the bit-accurate model.
 
-    The latency is ``latency`` cycles: one for rounding, one for saturation, and a delay for the rest. If the
-    initiation interval is over 1, one more cycle takes the operand in. With the delay the term leaves
-    together with the term of a longer unit beside this unit. If the interval is 1, the delay is a memory of
-    look-up tables. Else it is a register for each interval. The unit has no multipliers.
+    The term is ``max(N . L, 0)``, rounded half up to ``UQ(0, 17)`` and saturated. The latency is ``latency``
+    cycles: one for rounding, one for saturation, and a delay for the rest. If the initiation interval is over
+    1, one more cycle takes the operand in. With the delay the term leaves together with the term of a longer
+    unit beside this unit. If the interval is 1, the delay is a memory of look-up tables. Else it is a
+    register for each interval. The unit has no multipliers.
 
     Parameters
     ----------
@@ -65,5 +66,5 @@ class DiffuseUnit(PipelinedUnit):
         )
 
     def datapath(self, m, operands):
-        """The graph; the result is read at the stage at which the beat leaves."""
+        """Describe the registers of the graph. The result is read at the stage at which the beat leaves."""
         return self._graph.build(m, self, operands)(self._result, self.latency)

@@ -103,7 +103,7 @@ class HighlightGateUnit(PipelinedUnit):
         )
 
     def datapath(self, m, operands):
-        """The PROM, addressed by the exponent, and the graph."""
+        """The PROM, addressed by the exponent, and the registers of the graph."""
         p = self.model
         if self.takes_threshold:
             self._threshold = self.register(m, self.constants.threshold, "threshold")

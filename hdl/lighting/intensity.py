@@ -59,7 +59,7 @@ def _constants_shape(model: Intensity) -> data.StructLayout:
 
 
 class IntensityUnit(PipelinedUnit):
-    """``I = k_a I_a + sum_i I_i (k_d D_i + k_s S_i)`` for each channel, rounded half up, and saturated.
+    """Intensity ``I = k_a I_a + sum_i I_i (k_d D_i + k_s S_i)`` of a channel, rounded half up and saturated.
 
     Formats and error are those of the bit-accurate model `Intensity`. The sum grows by a bit at each level of
     the adder tree, so nothing wraps.

@@ -103,7 +103,7 @@ def kind_of(model: HighlightOperand) -> SpecularKind:
 
 
 class LightUnit(wiring.Component):
-    """``max(N . L, 0)`` and the reflection model of ``N . H``, for one light.
+    """Terms of one light: ``max(N . L, 0)``, and the reflection model of ``N . H``.
 
     A beat is dark if the light is behind the surface, or if a highlight gate tells that the span has no
     highlight.

@@ -230,7 +230,7 @@ class LobeUnit(PipelinedUnit):
         return m
 
     def datapath(self, m, operands):
-        """The graph, read at the stage of its last word."""
+        """Describe the registers of the graph, and read its results in the last stage."""
         p = self.model
         self._base = Const(0, 1)
         if p.banks > 1 and p.operand != "place":

@@ -17,7 +17,7 @@ __all__ = ["PowerUnit"]
 
 
 class PowerUnit(PipelinedUnit):
-    """``max(cos gamma, 0)^n``, 0 for a dark beat, with the ports of `SpecularUnit`.
+    """Specular term ``max(cos gamma, 0)^n``, or 0 for a dark beat. The ports are those of `SpecularUnit`.
 
     The bit-accurate model `Power` has method, formats and error bound.
 

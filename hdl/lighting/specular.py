@@ -115,7 +115,7 @@ class SlopeUnit(wiring.Component):
 
 
 class SpecularUnit(PipelinedUnit):
-    """``max(1 - k (1 - cos gamma), 0)^2`` or a higher power, 0 for a dark beat.
+    """Specular term ``max(1 - k (1 - cos gamma), 0)^2`` or a higher power. It is 0 for a dark beat.
 
     The bit-accurate model `Specular` has models, formats, PROM and error bound. A beat is dark if
     the light is behind the surface, or if a highlight gate tells that its span has no highlight. A dark beat
@@ -213,7 +213,7 @@ class SpecularUnit(PipelinedUnit):
         return by_slope + model.squarings + chords
 
     def datapath(self, m, operands):
-        """The graph, and slope and boundary."""
+        """The registers of the graph, and the words of slope and boundary."""
         self._slope = self._frame_values(m)
         return self._graph.build(m, self, operands)(self._result, self.latency)
 
@@ -302,7 +302,7 @@ class SpecularUnit(PipelinedUnit):
         right: Callable[[Any], FixedValue] = lambda value: value,
         formula: str | None = None,
     ) -> Word:
-        """Exact product.
+        """Word of an exact product.
 
         With a multiplier of its own the product takes one cycle. Otherwise it is issued to a shared
         multiplier.

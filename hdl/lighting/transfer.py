@@ -72,7 +72,7 @@ class TransferUnit(PipelinedUnit):
         )
 
     def datapath(self, m, operands):
-        """The table, with a port for each instance, and the graph read at the stage of its last word."""
+        """The table, with a port for each instance, and the registers of the graph."""
         p = self.model
         words = p.words.tolist()
         m.submodules.table = self._table = Memory(shape=p.WORD_FORMAT.width, depth=len(words), init=words)

@@ -17,10 +17,10 @@ EMPTY_SEGMENT_CYCLES = 3
 
 
 class BisectionInterpolatorUnit(NormalInterpolatorUnit, model=BisectionInterpolator):
-    """The adaptive normaliser. `BisectionInterpolator` is the bit-accurate model.
+    """Operands by normals of the adaptive normaliser. `BisectionInterpolator` is the bit-accurate model.
 
-    `latency` and `setup_interval` hold for a span of one segment. More segments take longer (see
-    `AdaptiveNormaliserUnit`).
+    `latency` and `setup_interval` hold for a span of one segment. A span of several segments takes more
+    cycles (see `AdaptiveNormaliserUnit`).
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""Interpolators, units that take a span to the operands of its pixels, by any method."""
+"""Interpolators: units that turn a span into the operands of its pixels, by any method."""
 
 from collections.abc import Sequence
 from typing import ClassVar

@@ -47,7 +47,7 @@ def operands_shape(
 
 
 class LightProductsUnit(PipelinedUnit):
-    """``N . L``, and ``N . H`` or half the squared chord, of a normal with L and H of every light.
+    """Products of a normal for every light: ``N . L``, and ``N . H`` or half the squared chord.
 
     `NormalInterpolator.products` is the bit-accurate model. With an initiation interval of 1 the latency is 5
     cycles (operands, two for the products, two sums). With the chord it is 8 cycles. There are six products
@@ -111,7 +111,7 @@ class LightProductsUnit(PipelinedUnit):
         )
 
     def datapath(self, m, operands):
-        """The graph. The chord is brought into the specular unit's format."""
+        """Describe the registers of the graph. The chord is brought into the specular unit's format."""
         value = self._graph.build(m, self, operands)
         result = Signal(self.o.payload.shape())
         for light, words in zip(result, self._words, strict=True):

@@ -43,7 +43,7 @@ class LocalChordInterpolatorUnit(InterpolatorUnit, model=LocalChordInterpolator)
 
     @property
     def shortest_interval(self):
-        """1, the interval of spans of one pixel."""
+        """Least cycles from any span to the next: 1, after a span of one pixel."""
         return 1
 
     def span_intervals(self, spans):
@@ -57,7 +57,7 @@ class LocalChordInterpolatorUnit(InterpolatorUnit, model=LocalChordInterpolator)
 
     @classmethod
     def span_shape(cls, lights, *, highlights=True, length_bits=LENGTH_BITS, factors=0):
-        """Three values of each light's operands, three of each factor, and the length."""
+        """Shape of a span: three values of each light's operands, three of each factor, and the length."""
         return span_operands_shape(lights, highlights, length_bits, factors)
 
     def __init__(self, model: LocalChordInterpolator, lights: int, **options):
@@ -108,10 +108,10 @@ class LocalChordInterpolatorUnit(InterpolatorUnit, model=LocalChordInterpolator)
             yield f"factor_{index}", *(span.factors[index] for span in spans)
 
     def constant_members(self):
-        """None, because spans bring values in place of L and H."""
+        """No ports, because spans bring values in place of L and H."""
         return {}
 
     @property
     def light_vectors(self):
-        """Empty, because the method does not read L and H."""
+        """No ports, because the method does not read L and H."""
         return ()

@@ -43,7 +43,7 @@ class QuotientInterpolatorUnit(InterpolatorUnit, model=QuotientInterpolator):
 
     @classmethod
     def span_shape(cls, lights, *, highlights=True, length_bits=LENGTH_BITS, mirror=False):
-        """Vectors in the frames of the lights at the first pixel, their step, and the length."""
+        """Shape of a span: vectors in the frames of the lights, their steps, and the length."""
         return vectors_shape(QuotientSpans(lights, highlights, mirror and highlights), length_bits)
 
     @classmethod
@@ -55,7 +55,7 @@ class QuotientInterpolatorUnit(InterpolatorUnit, model=QuotientInterpolator):
 
     @property
     def shortest_interval(self):
-        """1, the interval of spans of one pixel."""
+        """Least cycles from any span to the next: 1, after a span of one pixel."""
         return 1
 
     def span_intervals(self, spans):
@@ -64,7 +64,7 @@ class QuotientInterpolatorUnit(InterpolatorUnit, model=QuotientInterpolator):
 
     @property
     def has_begun(self):
-        """The port ``begun``."""
+        """Whether words of the offered span were taken already: the port ``begun``."""
         return self.begun
 
     def further_members(self):

@@ -68,7 +68,7 @@ class RenormaliseInterpolatorUnit(NormalInterpolatorUnit, model=RenormaliseInter
     """
 
     DEFAULT_INTERVAL = 3
-    """An interval of 4 takes as many multipliers."""
+    """Largest default of `setup_interval`. An interval of 4 takes as many multipliers as 3."""
 
     @classmethod
     def setup_intervals(cls, model):
@@ -77,7 +77,7 @@ class RenormaliseInterpolatorUnit(NormalInterpolatorUnit, model=RenormaliseInter
 
     @classmethod
     def span_shape(cls, lights, *, highlights=True, length_bits=LENGTH_BITS):
-        """Ends of the line, vectors in ``SQ(1, 22)``, and the length."""
+        """Shape of a span: ends of the line, which are vectors in ``SQ(1, 22)``, and the length."""
         members = span_normals_shape(length_bits).members
         ends = dict.fromkeys(("normal_left", "normal_right"), vector_shape())
         return data.StructLayout({**members, **ends})

@@ -101,7 +101,7 @@ class BisectionUnit(PipelinedUnit):
         )
 
     def datapath(self, m, operands):
-        """The graph, read at the stage of its last word."""
+        """Describe the registers of the graph, and read its results in the last stage."""
         value = self._graph.build(m, self, operands)
         read = {name: value(word, self.latency) for name, word in self._words.items()}
         result = Signal(self.o.payload.shape())

@@ -123,7 +123,7 @@ class DifferenceSetupUnit(PipelinedUnit):
         )
 
     def datapath(self, m, operands):
-        """The graph, read at the stage of its last word."""
+        """Describe the registers of the graph, and read its results in the last stage."""
         value = self._graph.build(m, self, operands)
         result = Signal(self.o.payload.shape())
         for index, word in self._words.items():
@@ -149,7 +149,7 @@ class DifferenceSetupUnit(PipelinedUnit):
         return words
 
     def _products(self, words, p, g, reciprocal, shift) -> None:
-        """``P dt + G dt^2`` and ``2 G dt^2``."""
+        """Words of ``P dt + G dt^2`` and ``2 G dt^2``."""
         graph = self._graph
         product = self._product(
             "square_exact", reciprocal, reciprocal, lambda reciprocal: reciprocal.extend(COMPONENT)
@@ -169,7 +169,7 @@ class DifferenceSetupUnit(PipelinedUnit):
             words["second", c] = graph.register(f"second_{c}", _twice, second)
 
     def _as_published(self, words, p, g, reciprocal, shift) -> None:
-        """``(G dt + P) dt`` and ``2 (G dt) dt``. The word of ``G dt`` does not contain the shift of dt."""
+        """Words of ``(G dt + P) dt`` and ``2 (G dt) dt``. The word of ``G dt`` lacks the shift of dt."""
         graph = self._graph
         curvature_format, step_format = DifferenceSetup.CURVATURE_FORMAT, SQ(1, 29)
         products = [
@@ -215,7 +215,7 @@ class DifferenceSetupUnit(PipelinedUnit):
             )
 
     def _product(self, name: str, factor: Word, operand: Word, wiring) -> Word:
-        """Exact product."""
+        """Word of an exact product."""
 
         def operands(factor, operand):
             return factor, wiring(operand), Const(0, 5)

@@ -55,7 +55,7 @@ class DotProductUnit(PipelinedUnit):
         )
 
     def datapath(self, m, operands):
-        """Products, then the sum of two, then of all."""
+        """Three products, then the sum of two products, then the sum of all three."""
         products = [
             self.register(m, operands.a[axis] * operands.b[axis], f"product_{axis}") for axis in range(3)
         ]

@@ -72,7 +72,7 @@ class GPQUnit(PipelinedUnit):
         )
 
     def datapath(self, m, operands):
-        """Each component by itself."""
+        """First sums, second sums and saturation of each component."""
         register = self.register
         result = Signal(self.o.payload.shape())
         for c in range(3):

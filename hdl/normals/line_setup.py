@@ -122,7 +122,7 @@ class LineSetupUnit(PipelinedUnit):
         return register(shifted.round_half_up(format.fraction_bits).wrap(format), "rounded")
 
     def datapath(self, m, operands):
-        """The graph, read at the stage of its last word."""
+        """Describe the registers of the graph, and read its results in the last stage."""
         value = self._graph.build(m, self, operands)
         result = Signal(self.o.payload.shape())
         for name in ("start", "length"):

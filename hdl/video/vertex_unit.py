@@ -193,7 +193,7 @@ class VertexUnit(PipelinedUnit):
         return above.any() & ~above.all()
 
     def datapath(self, m, operands):
-        """The graph, read at the stage of its last words."""
+        """Describe the registers of the graph, and read its results in the last stage."""
         self._module = m
         read = self._graph.build(m, self, operands)
         value = {name: read(word, self.latency) for name, word in self._results.items()}

@@ -111,7 +111,7 @@ def test_design_without_the_factor_is_refused():
     [
         (
             {"method": "renormalise", "factors": (0,)},
-            r"^factors of lights need values of spans, of chord-local, and ",
+            r"^factors of lights need the method chord-local, and ",
         ),
         ({"model": None, "factors": (0,)}, r"and specular light$"),
         ({"factors": (1,)}, r"^factors must be different lights of 1, in order$"),
