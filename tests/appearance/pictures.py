@@ -1,19 +1,29 @@
-"""Pictures of glTF files by VTK, whose reader and renderer share no code with the project.
+"""Pictures of files by VTK, whose reader and renderer share no code with the project.
 
 VTK's importer reads meshes, nodes, colours, texture coordinates and images. Its materials are approximate. It
 has a wrap mode for both axes, none that mirrors, and no reversed winding under nodes that mirror. So each
-actor is drawn without VTK's material, as glTF and OpenGL define colour and winding.
+actor is drawn without VTK's material, as glTF and OpenGL define colour and winding. The shader discards
+fragments whose alpha is under a cutoff. The other fragments are opaque.
+
+Of a file of another format VTK draws what the sample says that the file shows.
 
 VTK decodes texels from sRGB only where a texture has `UseSRGBColorSpace`. OpenGL then decodes them before it
-filters. Products are linear light. VTK's frame buffer does not encode: the last line of the shader does.
+filters. Products are linear light. VTK's frame buffer does not encode: the last lines of the shader do.
 """
 
 import os
+from pathlib import Path
 
 import numpy as np
 
 from blysk.golden.frames.frame import background_code
 from blysk.golden.reference.lighting import distant_cosine
+
+CUT = """
+  if (gl_FragData[0].a < %.9f) discard;
+  gl_FragData[0].a = 1.0;
+"""
+"""A cutoff of alpha in GLSL."""
 
 ENCODE = """
   vec3 light = clamp(gl_FragData[0].rgb, 0.0, 1.0);
@@ -23,13 +33,13 @@ ENCODE = """
 """The curve of sRGB (IEC 61966-2-1) in GLSL."""
 
 
-def drawn(path, scene, sampler=None, shifts=((0, 0),), lit=False):
+def drawn(source, scene, sampler=None, shifts=((0, 0),), lit=False, cutoff=0.0):
     """Pictures of a file by VTK's software renderer, with the camera of a scene.
 
     Parameters
     ----------
-    path : Path
-        A glTF file.
+    source : Path or Shape
+        A glTF file, or what a file of another format shows.
     scene : Scene
         The camera, the size and the background. If ``lit``, also the light and the coefficients.
     sampler : dict
@@ -38,6 +48,8 @@ def drawn(path, scene, sampler=None, shifts=((0, 0),), lit=False):
         One picture for each: by how many pixels the camera moves to the right and up.
     lit : bool
         Whether to draw with light, by Phong's model. If not, each surface has its own colour.
+    cutoff : float
+        Fragments with a smaller alpha are dropped.
 
     Returns
     -------
@@ -61,14 +73,17 @@ def drawn(path, scene, sampler=None, shifts=((0, 0),), lit=False):
     window.SetMultiSamples(0)
     window.SetSize(scene.width, scene.height)
     window.AddRenderer(renderer)
-    importer = vtkGLTFImporter()
-    importer.SetFileName(str(path))
-    importer.SetRenderWindow(window)
-    importer.Update()
+    if isinstance(source, Path):
+        importer = vtkGLTFImporter()
+        importer.SetFileName(str(source))
+        importer.SetRenderWindow(window)
+        importer.Update()
+    else:
+        renderer.AddActor(_actor(source))
 
     textures = []
     for actor in renderer.GetActors():
-        texture = _plain(actor, sampler or {})
+        texture = _plain(actor, sampler or {}, cutoff)
         textures += [] if texture is None else [texture]
         if lit:
             _shine(actor, scene)
@@ -95,7 +110,41 @@ def drawn(path, scene, sampler=None, shifts=((0, 0),), lit=False):
     return np.array(found)
 
 
-def _plain(actor, sampler):
+def _actor(shape):
+    """Triangles with colours of vertices, or with an image."""
+    from vtkmodules.util.numpy_support import numpy_to_vtk
+    from vtkmodules.vtkCommonCore import vtkPoints
+    from vtkmodules.vtkCommonDataModel import vtkCellArray, vtkImageData, vtkPolyData
+    from vtkmodules.vtkRenderingCore import vtkActor, vtkPolyDataMapper, vtkTexture
+
+    points, cells, data = vtkPoints(), vtkCellArray(), vtkPolyData()
+    points.SetData(numpy_to_vtk(np.array(shape.vertices, np.float64), deep=True))
+    for face in np.array(shape.faces).tolist():
+        cells.InsertNextCell(3, face)
+    data.SetPoints(points)
+    data.SetPolys(cells)
+    actor, mapper = vtkActor(), vtkPolyDataMapper()
+    mapper.SetInputData(data)
+    actor.SetMapper(mapper)
+    actor.GetProperty().SetColor(shape.color)
+    if shape.colors is not None:
+        codes = np.rint(255 * np.array(shape.colors)).astype(np.uint8)
+        data.GetPointData().SetScalars(numpy_to_vtk(codes, deep=True))
+    if shape.image is not None:
+        data.GetPointData().SetTCoords(numpy_to_vtk(np.array(shape.places, np.float32), deep=True))
+        image, texture = vtkImageData(), vtkTexture()
+        height, width, channels = shape.image.shape
+        image.SetDimensions(width, height, 1)
+        # VTK's first row is the lowest, and v = 0 is its border.
+        rows = np.array(shape.image[::-1], np.uint8).reshape(-1, channels)
+        image.GetPointData().SetScalars(numpy_to_vtk(rows, deep=True))
+        texture.SetInputData(image)
+        texture.SetUseSRGBColorSpace(True)
+        actor.GetProperty().SetTexture("albedoTex", texture)
+    return actor
+
+
+def _plain(actor, sampler, cutoff):
     """Take VTK's material from an actor, and keep its colour and texture; the texture, or None."""
     from vtkmodules.vtkFiltersCore import vtkReverseSense
 
@@ -110,7 +159,11 @@ def _plain(actor, sampler):
         turned.ReverseCellsOn()
         actor.GetMapper().SetInputConnection(turned.GetOutputPort())
     # After the texture, which multiplies light.
-    actor.GetShaderProperty().AddFragmentShaderReplacement("//VTK::DepthPeeling::Impl", True, ENCODE, False)
+    code = CUT % cutoff + ENCODE
+    actor.GetShaderProperty().AddFragmentShaderReplacement("//VTK::DepthPeeling::Impl", True, code, False)
+    # Else VTK draws an actor with alpha after all others, and does not test its depth.
+    actor.ForceTranslucentOff()
+    actor.ForceOpaqueOn()
     if texture is not None:
         texture.SetUseSRGBColorSpace(True)
         texture.SetInterpolate(sampler.get("magFilter", 9729) == 9729)

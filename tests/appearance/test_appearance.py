@@ -21,8 +21,14 @@ from .samples import SAMPLES
 SIZE = 128, 96
 LOOK = {"projection": "orthographic", "view": (0.1, 0.2, 1), "background": (0.2, 0, 0.2)}
 SHIFTS = (0, 0), (0.0625, 0), (-0.0625, 0), (0, 0.0625), (0, -0.0625)
-OPTIONS = "view", "back_faces", "lights", "specular", "projection", "field_of_view"
-QUICK = "texture settings, 3", "vertex colours, u2 x 4"
+OPTIONS = "view", "back_faces", "lights", "ambient", "diffuse", "specular", "projection", "field_of_view"
+QUICK = (
+    "texture settings, 3",
+    "vertex colours, u2 x 4",
+    "holes, bilinear",
+    "OBJ, image",
+    "PLY, colours, ascii",
+)
 
 
 class Pictures(NamedTuple):
@@ -41,17 +47,11 @@ def pictures(name: str) -> Pictures:
     make, given = SAMPLES[name]
     file, look = make(**given) if isinstance(given, dict) else make(*given)
     options = {key: look.pop(key) for key in OPTIONS if key in look}
-    lit = "lights" in options
+    lit, cutoff = bool(options.get("lights")), look.pop("cutoff", 0.0)
     with TemporaryDirectory() as folder:
-        path = Path(folder) / "sample.glb"
-        file.write(path)
         # A warning, of contents that are not read, would be an error.
-        scene = blysk.scene(path, size=SIZE, **LOOK | options)
-        # VTK's importer changes colours without light, in some of its versions.
-        for material in file.document["materials"]:
-            material.pop("extensions", None)
-        file.write(path)
-        seen = drawn(path, scene, look, SHIFTS, lit).astype(int)
+        scene = blysk.scene(file.write(Path(folder)), size=SIZE, **LOOK | options)
+        seen = drawn(file.for_vtk(Path(folder)), scene, look, SHIFTS, lit, cutoff).astype(int)
     frame = render(scene, model=REFLECTION_MODELS["phong"])
     sure = (np.abs(seen - seen[0]) <= 8).all(axis=(0, -1))
     return Pictures(scene, frame.mask, 255 * encode(frame.image), seen[0], sure)
