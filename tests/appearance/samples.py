@@ -346,7 +346,14 @@ def perspective():
 
 
 def holes(
-    cutoff=None, filter=NEAREST, alpha=None, vertices=(255,) * 4, factor=1.0, mode="MASK", places=PLACES
+    cutoff=None,
+    filter=NEAREST,
+    alpha=None,
+    vertices=(255,) * 4,
+    factor=1.0,
+    mode="MASK",
+    places=PLACES,
+    look=(),
 ):
     """A sheet with holes, a plate behind it, and the background beside the plate: AlphaBlendModeTest.
 
@@ -369,20 +376,21 @@ def holes(
         [0, 1, 2, 0, 2, 3],
         **plate,
     )
-    return file, {**filter, "cutoff": (0.5 if cutoff is None else cutoff) if mode == "MASK" else 0.0}
+    drops = (0.5 if cutoff is None else cutoff) if mode == "MASK" else 0.0
+    return file, {**filter, "cutoff": drops, **dict(look)}
 
 
 def reduced_holes():
     """An image of 2 x 2 texels a pixel, of which 3 or 1 have an alpha of 1. So its level has 3/4 or 1/4."""
     dense = np.random.default_rng(6).random((16, 16)) < 0.6
-    shown = np.where(np.indices((64, 64)).sum(axis=0) % 2, 255, 0)
-    shown[::2, ::2] = 255 * np.kron(dense, np.ones((2, 2)))
+    # Of each 2 x 2 texels the upper left is opaque, and two more where it is dense.
+    shown = np.kron(dense, np.ones((4, 4)))
+    shown[::2, ::2] = 1
     shown[1::2, 1::2] = 0
-    shown[::2, 1::2] = 255 * np.kron(dense, np.ones((2, 2)))
-    shown[1::2, ::2] = 255
+    shown = 255 * shown
     places = PLACES * 2 * 0.9 * 96 / 64
-    file, look = holes(0.6, {"magFilter": 9729, "minFilter": 9985}, shown, places=places)
-    return file, {**look, "view": "front"}
+    filter = {"magFilter": 9729, "minFilter": 9985}
+    return holes(0.6, filter, shown, places=places, look={"view": "front"})
 
 
 WHITE = {"ambient": 1, "diffuse": 1, "specular": 0, "lights": []}
@@ -511,6 +519,14 @@ SAMPLES = {
     "holes of a product": (
         holes,
         {"cutoff": 0.3, "filter": LINEAR, "alpha": ALPHA, "vertices": (255, 130, 240, 200), "factor": 0.8},
+    ),
+    "holes in perspective": (
+        holes,
+        {
+            "alpha": ALPHA,
+            "vertices": (255, 110, 140, 250),
+            "look": {"view": (0.5, 1.2, 0.8), "projection": "perspective", "field_of_view": 70},
+        },
     ),
     "holes, reduced": (reduced_holes, ()),
     "alpha without holes": (holes, {"alpha": ALPHA, "vertices": (0, 99, 9, 0), "mode": "OPAQUE"}),
