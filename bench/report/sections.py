@@ -13,6 +13,7 @@ SECTIONS: dict[str, str] = {
     "world": "blysk.bench.report.world",
     "place-and-route": "blysk.bench.report.place_and_route",
     "geometry": "blysk.bench.report.geometry",
+    "albedo": "blysk.bench.report.albedo",
     "energy": "blysk.bench.report.energy",
     "thesis": "blysk.bench.report.thesis",
     "cosine-quadratic": "blysk.bench.report.cosine_quadratic",
