@@ -1,4 +1,5 @@
-"""Coverage and attributes of triangles by another way than the units': three edges, rational planes."""
+"""Coverage and attributes of triangles, found in another way than in the units: three edge functions,
+rational planes."""
 
 from typing import NamedTuple
 
@@ -19,13 +20,13 @@ class Covered(NamedTuple):
 def covered(triangles, frame, grid) -> Covered:
     """Spans of all triangles, seen from either side, by the three edge functions of each.
 
-    ``e(x, y) = a x + b y + c`` of an edge is positive inside. A centre on it is covered where the inside is
-    to the right of it, or it is horizontal and the inside below. On a scanline each edge bounds x from one
-    side; the largest of the lower bounds and the smallest of the upper ones are the span.
+    ``e(x, y) = a x + b y + c`` of an edge is positive inside. A centre on an edge is covered if the inside is
+    to the right of the edge, or if the edge is horizontal and the inside is below. On a scanline each edge
+    bounds x from one side. The largest lower bound and the smallest upper bound are the span.
     """
     x, y = triangles.x, triangles.y
     area = (x[:, 1] - x[:, 0]) * (y[:, 2] - y[:, 0]) - (x[:, 2] - x[:, 0]) * (y[:, 1] - y[:, 0])
-    # Corners in the order in which the inside is where the functions are positive.
+    # Corners in the order in which the edge functions are positive inside.
     x, y = (np.where(area[:, np.newaxis] < 0, v[:, ::-1], v) for v in (x, y))
     solid = area != 0
     first = np.maximum(grid.first_centre(y.min(axis=1)), frame.top)
@@ -42,7 +43,8 @@ def covered(triangles, frame, grid) -> Covered:
         # e at the centre of column i is rest + slope i.
         rest = a * (grid.half - x0) + b * (centre - y0)
         slope = a * grid.steps
-        # Positive, or 0 on a left or a top edge: e is an integer, so that 1 less is enough.
+        # e is positive, or 0 on a left or a top edge. e is an integer, so a bound lower by 1 serves for the
+        # edge.
         rest = np.where((a > 0) | ((a == 0) & (b > 0)), rest, rest - 1)
         up = np.where(slope > 0, -(rest // np.where(slope > 0, slope, 1)), begin)
         down = np.where(slope < 0, rest // np.where(slope < 0, -slope, 1) + 1, end)
@@ -53,7 +55,10 @@ def covered(triangles, frame, grid) -> Covered:
 
 
 def attribute_at(triangles, triangle, x, y, grid) -> np.ndarray:
-    """Attributes at pixel centres in float64, shape (P, 4): by areas, so that no sum is over a corner's."""
+    """Attributes at pixel centres in float64, shape (P, 4).
+
+    They come from areas, so no sum exceeds the values at the corners.
+    """
     px, py = x * grid.steps + grid.half, y * grid.steps + grid.half
     cx, cy = triangles.x[triangle], triangles.y[triangle]
     weights = []

@@ -1,4 +1,4 @@
-"""Coarse depth test against the depths of every pixel: nothing that is to be seen is dropped."""
+"""Coarse depth test against the depths of every pixel: no visible pixel is dropped."""
 
 import numpy as np
 import pytest
@@ -13,7 +13,7 @@ from blysk.golden.render import Renderer
 
 
 def spans_of(rng, count, width, height, spread):
-    """Spans anywhere in a picture, of depths that differ by ``spread`` of the whole or less."""
+    """Spans anywhere in a picture. Their depths differ by at most ``spread`` of the whole range."""
     length = rng.integers(1, min(width, 30) + 1, count)
     left, right = rng.integers(0, max(int(spread * 2**24), 2), (2, count)) << 9
     return {
@@ -26,7 +26,7 @@ def spans_of(rng, count, width, height, spread):
 
 
 def hidden_of_pixels(spans):
-    """Spans of which the depth test draws no pixel, and the pixels that each has."""
+    """Whether the depth test draws no pixel of a span, and the number of pixels of each span."""
     length = spans["length"]
     span, k = pixels_of(length)
     test = DepthTester()
@@ -39,7 +39,8 @@ def hidden_of_pixels(spans):
 @pytest.mark.parametrize("bits", [8, 12, 24])
 @pytest.mark.parametrize("spread", [1.0, 2.0**-11])
 def test_what_is_dropped_is_hidden(block, bits, spread):
-    """In small pictures of odd widths, each many spans deep; most of what is hidden is found."""
+    """In small pictures of odd widths, each with many layers of spans, only hidden spans are dropped, and
+    most of them are."""
     rng = np.random.default_rng(block + bits)
     found = possible = 0
     for width, height in ((1, 3), (7, 2), (33, 1), (64, 2)):
@@ -48,12 +49,12 @@ def test_what_is_dropped_is_hidden(block, bits, spread):
         hidden = hidden_of_pixels(spans)
         assert not (dropped & ~hidden).any()
         found, possible = found + dropped.sum(), possible + hidden.sum()
-    # Few upper bits cannot tell depths apart that differ by 2^-11 of the whole.
+    # Few upper bits cannot tell depths apart that differ by 2^-11 of the whole range.
     assert found > 0.5 * possible or (bits < 24 and spread < 1)
 
 
 def test_pictures_begin_cleared():
-    """As many tests as pictures, each of its own."""
+    """Several pictures give as many hidden spans as if each were tested alone."""
     rng = np.random.default_rng(3)
     test = CoarseDepth(40, 3)
     spans = spans_of(rng, 600, 40, 3, 1.0)
@@ -64,7 +65,7 @@ def test_pictures_begin_cleared():
 
 
 def test_spans_that_go_out_of_the_picture_are_kept_and_change_nothing():
-    """Their blocks would be those of the next scanline, or of the first."""
+    """The blocks of these spans would be those of the next scanline, or of the first."""
     rng = np.random.default_rng(4)
     test, spans = CoarseDepth(40, 3), spans_of(rng, 600, 40, 3, 1.0)
     beside, below = rng.random((2, 600)) < 0.2
@@ -80,7 +81,7 @@ def test_spans_that_go_out_of_the_picture_are_kept_and_change_nothing():
 
 @pytest.mark.parametrize(("back_faces", "least"), [("flip", 0.3), ("cull", 0.005)])
 def test_frames_are_the_same(back_faces, least):
-    """The picture of a teapot to the bit, with fewer pixels shaded."""
+    """The picture of a teapot is the same to the bit, with fewer pixels shaded."""
     scene = blysk.scene("teapot", triangles=1000, size=(160, 120), back_faces=back_faces)
     design = preset("renormalise", "blinn")
     plain = triangle_frame(scene, Renderer(design))

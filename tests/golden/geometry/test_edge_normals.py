@@ -1,4 +1,4 @@
-"""Unit normals of spans against perspective-correct ones in float64, and where spans are cut."""
+"""Unit normals of spans against perspective-correct normals in float64, and the places of cuts."""
 
 import numpy as np
 import pytest
@@ -17,7 +17,8 @@ FRAME = FrameSettings(-200, -200, 200, 200)
 
 
 def test_normals_within_the_bound():
-    """Left and right: the error of N/W over its length, and that of the normaliser."""
+    """The bound of the left and the right normal: the error of N/W divided by its length, and the error of
+    the normaliser."""
     stages = Stages(random_triangles(np.random.default_rng(1), 2000, size=20.0, spread=0.3), FRAME)
     pieces, (spans, repaired) = stages.pieces, EdgeNormals().compute(stages.pieces)
     source = stages.drawn.source[pieces.triangle]
@@ -46,21 +47,22 @@ def assert_normals(found, line, bound, flip, chosen):
 
 @pytest.mark.parametrize("limit", [20, 100, 267])
 def test_no_piece_turns_more_than_the_limit(limit):
-    """Chords between the unit normals of a piece's ends, but for the errors of the normals themselves."""
+    """Chords between the unit normals of a piece's ends are within the limit, except for the errors of the
+    normals."""
     frame = FrameSettings(-200, -200, 200, 200, limit=limit)
     stages = Stages(random_triangles(np.random.default_rng(limit), 800, size=40.0, spread=0.2), frame)
     spans, _ = EdgeNormals().compute(stages.pieces)
     chord = np.linalg.norm(spans.normal_left - spans.normal_right, axis=1) / ONE
     assert chord.max() < limit / 1024 + 2.0**-10
     whole = np.bincount(stages.clipped.length[stages.clipped.length > 0]).sum()
-    # Something is cut, and not everything.
+    # Some spans are cut, and some are not.
     assert 1.1 * whole < len(spans) < stages.clipped.length.sum()
 
 
 @pytest.mark.ci
 @pytest.mark.long
 def test_opposite_normals_are_repaired():
-    """Where they cancel the normal before takes the place, and no pixel is lost."""
+    """Where normals cancel, the normal before takes their place, and no pixel is lost."""
     triangles = random_triangles(np.random.default_rng(3), 300, size=30.0)
     triangles.normal[:, 1] = -triangles.normal[:, 0]
     triangles.normal[:, 2] = triangles.normal[:, 0]
@@ -74,6 +76,6 @@ def test_opposite_normals_are_repaired():
 
 
 def test_angle_of_a_limit():
-    """No span is wider than the angle that a limit is made for."""
+    """No span is wider than the angle of its limit."""
     for angle in (1.0, 6.3, 15.0, 22.5):
         assert 2 * np.degrees(np.arcsin(FrameSettings.limit_of(angle) / 2048)) <= angle

@@ -14,7 +14,7 @@ from .exact import covered
 
 
 def triangles_of(points):
-    """Triangles of corners alone, shape (T, 3, 2)."""
+    """Triangles that have only corners, shape (T, 3, 2)."""
     shape = points.shape[:2]
     zeros = np.zeros(shape, dtype=np.int64)
     return Triangles(
@@ -23,7 +23,7 @@ def triangles_of(points):
 
 
 def spans(triangles, frame, grid):
-    """Index, scanline, first column and the first after the span, by the units' models."""
+    """Index, scanline, first column and first column after the span, by the models of the units."""
     drawn, rows, triangle, _ = Geometry(grid).rows(triangles, frame)
     kept = np.flatnonzero(rows.length)
     begin = rows.x[kept] + frame.left
@@ -39,7 +39,7 @@ def assert_covers(triangles, frame, grid):
 
 @pytest.mark.parametrize("bits", [4, 8])
 def test_random_triangles(bits):
-    """Slivers, needles, corners on pixel centres, the guard band's ends, pictures of all sizes."""
+    """Slivers, needles, corners on pixel centres, the ends of the guard band, pictures of all sizes."""
     rng, grid = np.random.default_rng(bits), Grid(bits)
     for frame in (small_frame(rng), small_frame(rng), FrameSettings(-300, -200, 340, 280)):
         assert assert_covers(random_triangles(rng, 20_000, grid), frame, grid) > 5000
@@ -66,7 +66,8 @@ def test_every_triangle_of_a_small_grid():
 
 @pytest.mark.parametrize("step", [16, *(pytest.param(k, marks=pytest.mark.long) for k in (1, 128))])
 def test_every_sample_of_a_shared_edge_is_drawn_once(step):
-    """Triangulations of random points, on the grid, on sixteenths of a pixel, on its centres and borders."""
+    """Triangulations of random points: on the grid, on sixteenths of a pixel, on pixel centres and
+    borders."""
     rng, grid, frame = np.random.default_rng(step), Grid(), FrameSettings(-20, -20, 20, 20)
     for _ in range(12):
         points = np.unique(rng.integers(-12 * 256 // step, 12 * 256 // step, (60, 2)), axis=0) * step
@@ -77,7 +78,7 @@ def test_every_sample_of_a_shared_edge_is_drawn_once(step):
         np.add.at(count, (y + 20, end + 20), -1)
         count = count.cumsum(axis=1)[:, :-1]
         centre = np.stack(np.meshgrid(*[np.arange(-20, 20) * 256 + 128] * 2), axis=-1)
-        # Well inside the hull, of which slivers may be missing, every centre is covered once.
+        # The hull may lack slivers. Well inside it every centre is covered once.
         inside = mesh.find_simplex(centre / 1.0) >= 0
         deep = inside & (np.abs(centre) < 8 * 256).all(axis=-1)
         assert count.max() == 1

@@ -12,7 +12,8 @@ from .exact import attribute_at
 
 
 def errors(stages):
-    """Errors of N/W and of the depth at both ends of pieces over their bound, and their triangles."""
+    """Errors of N/W and of the depth at both ends of pieces, divided by their bound, and the triangles of the
+    pieces."""
     pieces, frame, grid = stages.pieces, stages.frame, stages.grid
     source = stages.drawn.source[pieces.triangle]
     y = pieces.y + frame.top
@@ -33,7 +34,7 @@ def errors(stages):
 @pytest.mark.parametrize("bits", [4, pytest.param(8, marks=pytest.mark.long)])
 @pytest.mark.parametrize(("size", "count"), [(1.5, 9000), (12, 4000), (200, 150)])
 def test_bound(bits, size, count):
-    """Every covered triangle but slivers, of every size."""
+    """Every covered triangle of every size is tried, without slivers."""
     rng = np.random.default_rng(bits)
     triangles = random_triangles(rng, count, Grid(bits), size, spread=0.3)
     stages = Stages(triangles, FrameSettings(-200, -200, 200, 200), Grid(bits))
@@ -45,7 +46,8 @@ def test_bound(bits, size, count):
 
 
 def test_slivers_are_off_by_no_more_than_their_width():
-    """At most 1/256 pixel wide: a value of the triangle no further than that from the pixel."""
+    """A triangle at most 1/256 pixel wide gives the value of a point of the triangle within 1/256 pixel of
+    the pixel."""
     rng = np.random.default_rng(5)
     points = rng.integers(-8 * 256, 8 * 256, (200_000, 3, 2))
     points[:, 2] = points[:, 0] + (points[:, 1] - points[:, 0]) * rng.integers(0, 9, (200_000, 1)) // 8
@@ -56,7 +58,7 @@ def test_slivers_are_off_by_no_more_than_their_width():
     pieces = stages.pieces
     chosen = np.flatnonzero(stages.scales.sliver[pieces.triangle])
     assert len(chosen) > 100
-    # A span of a sliver is a pixel; its value is the long edge's, a mean of two corners.
+    # A span of a sliver has one pixel. Its value is that of the long edge, a mean of two corners.
     assert (pieces.length[chosen] == 1).all()
     index = pieces.triangle[chosen]
     corners = stages.drawn.triangles
@@ -73,7 +75,7 @@ def test_slivers_are_off_by_no_more_than_their_width():
 
 
 def test_refusal():
-    """Operands of another format."""
+    """Operands of another format are refused."""
     stages = Stages(random_triangles(np.random.default_rng(1), 20), FrameSettings(-20, -20, 20, 20), GRID)
     with pytest.raises(ValueError, match=r"^operands must be SQ\(1, 23\)$"):
         GradientSetup().compute(*[stages.scales.knee] * 3, stages.scales)

@@ -10,7 +10,7 @@ from blysk.golden.reference.lighting import halfway_vector
 
 
 def test_bounds():
-    """Angles up to nearly 180 degrees: direction and length."""
+    """Direction and length are within the bounds at angles up to nearly 180 degrees."""
     rng = np.random.default_rng(1)
     light = sphere(rng, 100_000)
     light, viewer = quantise(light), quantise(turned(rng, light, rng.uniform(0, 179.9, len(light))))
@@ -23,7 +23,7 @@ def test_bounds():
 
 
 def test_opposite():
-    """No direction is half-way between opposite ones."""
+    """Opposite directions have no direction half-way."""
     light = quantise(sphere(np.random.default_rng(2), 100))
     halfway, opposite = HalfwayVector().compute(*component_words(light, -light))
     assert opposite.all()

@@ -16,7 +16,7 @@ from blysk.golden.number.fixed import Fixed
 
 @pytest.fixture(scope="module")
 def pieces():
-    """Of triangles with normals far apart, the longest of each of length 1."""
+    """Pieces of triangles with normals far apart. The longest normal of each triangle has length 1."""
     triangles = random_triangles(np.random.default_rng(3), 600, size=30.0, spread=0.6)
     longest = np.linalg.norm(triangles.normal, axis=2).max(axis=1)[:, np.newaxis, np.newaxis]
     triangles.normal[:] = triangles.normal * ((2.0**23 - 1) / longest)
@@ -24,7 +24,8 @@ def pieces():
 
 
 def test_components(pieces):
-    """Both ends are N/W of the frame times one power of two, to the roundings that the bound counts."""
+    """Both ends are N/W of the frame times the same power of two, up to the roundings that the bound
+    counts."""
     frames = np.linalg.qr(np.random.default_rng(4).normal(size=(3, 3, 3)))[0].reshape(-1, 3)
     adapter = VectorAdapter(rotates=True)
     spans = adapter.compute(pieces)
@@ -40,18 +41,18 @@ def test_components(pieces):
     long = pieces.length > 1
     last = made.start + made.step * (2.0**-made.exponent * (made.length - 1))[:, np.newaxis]
     change = np.abs(right - left).max(axis=1, keepdims=True)
-    # N/W of geometry is cut to 26 fraction bits: 6 places up that is an eighth of a step.
+    # N/W of geometry is cut to 26 fraction bits. After a shift by 6 places this is an eighth of a step.
     of_step = 2 * np.maximum(change * 2.0**-17, 1 / 16) + 1 / 8 + 1 / 4
     error = np.abs(last - right @ axes.T) - np.sqrt(3) * first
     assert (error <= (1 + np.sqrt(3)) * of_step)[long].all()
-    # Nothing wraps, on the way either: lengths are under 1.
+    # No word wraps on the way, because lengths are under 1.
     for vectors in (made.start, made.step, last):
         assert np.linalg.norm(vectors[long].reshape(-1, 4, 3), axis=2).max() < 2**17 - 4
     assert np.linalg.norm(made.start.reshape(-1, 4, 3), axis=2).max() > 2**17 - 100
 
 
 def test_short_spans_of_any_ends():
-    """The step of a span of two pixels or three is shorter than 1, however far apart its ends are."""
+    """In a span of two or three pixels the step is shorter than 1, however far apart the ends are."""
     rng = np.random.default_rng(9)
     for pixels in (2, 3, 4):
         near, far = (sphere(rng, 4000) * rng.uniform(0.3, 1, (4000, 1)) for _ in range(2))
@@ -63,11 +64,11 @@ def test_short_spans_of_any_ends():
         step = np.linalg.norm(far - near, axis=1) / (pixels - 1)
         assert step[fits].max() < 1
         if pixels == 2:
-            # Without the further test some would be longer.
+            # Without the further test some steps would be longer.
             assert step[SpanHalver().fits(*ends, np.full(4000, 2))].max() > 1
 
 
 def test_largest_codes():
-    """1 and -1 have the codes 2^17 - 1, so that no axis is too long."""
+    """1 and -1 have the codes 2^17 - 1 and its negative, so that no axis is too long."""
     codes = LightAdapter.codes_of(np.array([1.0, -1.0, 0.5]))
     np.testing.assert_array_equal(codes, [2**17 - 1, 1 - 2**17, 2**16])

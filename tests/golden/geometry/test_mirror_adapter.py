@@ -1,4 +1,4 @@
-"""Components of R·V from vectors of three, against float64."""
+"""Components of R·V from vectors of three components, against float64."""
 
 import numpy as np
 import pytest
@@ -12,7 +12,7 @@ from blysk.golden.geometry.triangles import FrameSettings
 
 @pytest.mark.parametrize("degrees", [0, 20, 45, 80, 90])
 def test_components(degrees):
-    """Each product within half a step, and what the codes of sin a and cos a are off; in range."""
+    """Each product is in range, within half a step and the errors of the codes of sin a and cos a."""
     triangles = random_triangles(np.random.default_rng(5), 60, size=20.0, spread=0.5)
     spans, _ = Geometry(vectors=True).compute(triangles, FrameSettings(-100, -100, 100, 100))
     angle = np.radians(degrees)

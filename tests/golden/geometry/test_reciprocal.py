@@ -9,7 +9,7 @@ from blysk.golden.number.fixed import SQ, UQ, Fixed
 
 
 def test_bound():
-    """Each 32nd operand, and all near 1 and 2."""
+    """Each 32nd operand is tried, and all operands near 1 and 2."""
     p = Reciprocal()
     codes = np.r_[
         (1 << 25) + np.arange(0, 1 << 25, 32), (1 << 25) + np.arange(1000), (1 << 26) - np.arange(1, 1000)
@@ -24,14 +24,15 @@ def test_one_stays_one():
 
 
 def test_refusal():
-    """Numbers below 1, and other formats."""
+    """Numbers below 1, and other formats, are refused."""
     for operand in (Fixed(Reciprocal.FORMAT, np.array([5])), Fixed(UQ(1, 19), np.array([1 << 19]))):
         with pytest.raises(ValueError, match=r"^operands must be UQ\(1, 25\), from 1 on$"):
             Reciprocal().compute(operand)
 
 
 def test_wide_product():
-    """Signed and unsigned operands, within the rounding, three cuts and the product left out."""
+    """Products of signed and unsigned operands are within the rounding, three cuts, and the product that is
+    left out."""
     rng = np.random.default_rng(1)
     a = Fixed(SQ(2, 23), rng.integers(-(1 << 24), 1 << 24, 100_000))
     b = Fixed(UQ(1, 25), rng.integers(1 << 24, 1 << 25, 100_000))

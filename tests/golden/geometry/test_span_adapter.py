@@ -1,4 +1,4 @@
-"""What the shading pipeline reads of geometry's spans: middle normals, and true lines rounded."""
+"""The part of geometry's spans that the shading pipeline reads: unit normals, and rounded true lines."""
 
 import numpy as np
 import pytest
@@ -19,7 +19,7 @@ def pieces():
 
 
 def test_normals_are_passed_on(pieces):
-    """Each under its own name, with coordinates and material."""
+    """Each normal has its own name, with coordinates and material."""
     spans, _ = EdgeNormals().compute(pieces)
     shaded = shading_spans(spans)
     for name in ("x", "y", "length", "material", "normal_left", "normal_right"):
@@ -28,7 +28,7 @@ def test_normals_are_passed_on(pieces):
 
 
 def test_lines_are_in_proportion(pieces):
-    """Both ends are N/W times one power of two, turned where it says so, to half a step."""
+    """Both ends are N/W times the same power of two, to half a step. They are turned if the flag says so."""
     spans = LineAdapter().compute(pieces)
     exact = np.concatenate((pieces.left.values, pieces.right.values), axis=1)
     exact = np.where(pieces.flip[:, np.newaxis], -exact, exact)
@@ -36,7 +36,7 @@ def test_lines_are_in_proportion(pieces):
     largest = np.abs(exact).max(axis=1)
     scale = 2.0 ** np.clip(np.floor(-np.log2(np.maximum(largest, 2.0**-30))), 0, LineAdapter.LARGEST_SHIFT)
     error = np.abs(found - exact * scale[:, np.newaxis])
-    # Next to 1 the largest code stands for it; a power of two may be shifted one place less.
+    # Next to 1 the largest code stands for the value. A power of two may be shifted by one place less.
     usual = (np.abs(found).max(axis=1) < 1 - 2.0**-21) & (np.log2(largest) % 1 > 1e-6)
     assert usual.mean() > 0.98
     assert error[usual].max() <= LineAdapter.ERROR
@@ -45,7 +45,7 @@ def test_lines_are_in_proportion(pieces):
 
 
 def test_ends_of_the_range():
-    """-1, the largest code and 0, with and without a turn."""
+    """-1, the largest code and 0 are tried, with and without a turn."""
     codes = np.array([[SPAN_NORMAL.min_code, 0, 1], [SPAN_NORMAL.max_code, -1, 0], [0, 0, 0], [-1, 0, 1]])
     vectors = Fixed(SPAN_NORMAL, codes)
     most = LineAdapter.FORMAT.max_code

@@ -22,7 +22,7 @@ FRAME = FrameSettings(-200, -200, 200, 200)
 
 @pytest.fixture(scope="module")
 def spans():
-    """Spans of triangles with normals of any directions, and W in ratios to 100 and more."""
+    """Spans of triangles with normals of any directions, and W in ratios of 100 and more."""
     rng = np.random.default_rng(3)
     triangles = random_triangles(rng, 600, size=60.0, spread=0.5)
     triangles.normal[::2] //= 1 << rng.integers(0, 8, (300, 3, 1))
@@ -37,7 +37,7 @@ def halved(spans):
 
 
 def owners(spans, pieces):
-    """Span of each piece: pieces of a span follow each other."""
+    """The span of each piece. Pieces of a span follow each other."""
     span = np.repeat(np.arange(len(spans)), spans.length)
     return span[np.cumsum(pieces.length) - 1]
 
@@ -51,7 +51,10 @@ def nearest(left, right):
 
 
 def test_pieces_are_the_spans(spans, halved):
-    """Every pixel once, in order from the long edge on; N/W and depth at both ends are those of the plane."""
+    """Pieces have every pixel once, in order from the long edge on.
+
+    N/W and depth at both ends are those of the plane.
+    """
     pieces, cut = halved
     span = owners(spans, pieces)
     np.testing.assert_array_equal(np.bincount(span, pieces.length), spans.length)
@@ -73,7 +76,7 @@ def test_pieces_are_the_spans(spans, halved):
 
 
 def test_normals_stay_long(halved):
-    """At every pixel of a piece N/W is 5/16 of its scale or more: over what the method asks."""
+    """At every pixel of a piece N/W is 5/16 of its scale or more, which is more than the method needs."""
     pieces, _ = halved
     left, right = pieces.left.values, pieces.right.values
     largest = np.maximum(np.abs(left), np.abs(right)).max(axis=1)
@@ -86,13 +89,14 @@ def test_normals_stay_long(halved):
     # Steps fit the words of the method.
     step = np.abs(pieces.step.values[served]).max(axis=1) * scale
     assert 0.85 < step.max() < 1
-    # Both ends under 2^-8 are not cut for it.
+    # Spans with both ends under 2^-8 are not cut for their length.
     short = (pieces.length > 1) & (largest < 2.0**-8)
     assert short.sum() > 100
 
 
 def test_hardly_more_pieces_than_are_needed(spans, halved):
-    """As many as halving by the exact ratio 2 of the lengths and 90 degrees gives, or fewer."""
+    """There are as many pieces as by halving with the exact rules (ratio 2 of the lengths, 90 degrees), or
+    fewer."""
     left, right = spans.near.values[:, :3], spans.far.values[:, :3]
     length, count = spans.length, 0
     step = spans.inward.values[:, :3]
@@ -110,7 +114,7 @@ def test_hardly_more_pieces_than_are_needed(spans, halved):
 
 
 def test_attributes_have_their_format(spans):
-    """Words with another point are refused; no spans are no pieces."""
+    """Words with another binary point are refused. No spans give no pieces."""
     none = {
         name: getattr(spans, name)[:0]
         for name in ("x", "y", "length", "right", "flip", "material", "triangle")

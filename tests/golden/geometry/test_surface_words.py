@@ -16,7 +16,7 @@ BOTH = AttributeSpans(coordinates=True)
 
 
 def words_of(triangles, frame):
-    """Words of every pixel, the planes there, and the bound of the planes; only of triangles with a width."""
+    """Words of every pixel, the exact planes, and the bound of the planes, for triangles with a width."""
     geometry = Geometry(vectors=True, surface=BOTH)
     drawn, pieces, _ = geometry.pieces(triangles, frame)
     span, index = pixels_of(pieces.length)
@@ -43,7 +43,7 @@ def words_of(triangles, frame):
 
 @pytest.mark.parametrize(("size", "frame"), [(6.0, 30), (300.0, 200), (1900.0, 2000)])
 def test_words_within_their_bound_of_the_planes(size, frame):
-    """No word wraps. Triangles are of all kinds; many have colours of 0 or 1 at all corners."""
+    """No word wraps in triangles of all kinds. Many triangles have colours of 0 or 1 at all corners."""
     rng = np.random.default_rng(int(size))
     triangles = with_surface(random_triangles(rng, 60 if size > 100 else 1000, size=size), BOTH, rng)
     # A few scanlines of the largest triangles are enough.
@@ -54,7 +54,7 @@ def test_words_within_their_bound_of_the_planes(size, frame):
 
 
 def test_a_tall_thin_triangle_does_not_wrap():
-    """Errors of its planes add up over 4,000 scanlines: `LARGEST` leaves room for them."""
+    """Errors of its planes add up over 4,000 scanlines. `LARGEST` leaves room for these errors."""
     rng = np.random.default_rng(2)
     triangles = with_surface(random_triangles(rng, 200), BOTH, rng)
     low, high = GRID.coordinate.min_code, GRID.coordinate.max_code
@@ -69,7 +69,8 @@ def test_a_tall_thin_triangle_does_not_wrap():
 
 
 def test_steps_are_as_fine_as_they_fit():
-    """The largest exponent, and words that give the step back; any codes, and powers of two."""
+    """The exponent is the largest possible, and the words give the step back, for any codes and for powers of
+    two."""
     rng = np.random.default_rng(4)
     codes = rng.integers(-(1 << 32), 1 << 32, (4000, 4)) >> rng.integers(0, 33, (4000, 1))
     codes[::5, 1] = rng.choice([-1, 1], 800) * (1 << rng.integers(0, 32, 800))

@@ -23,19 +23,22 @@ def pieces():
 
 
 def test_vectors_are_in_proportion(pieces):
-    """Both ends are N/W times one power of two, turned where it says so, to the rounding of the words."""
+    """Both ends are N/W times the same power of two, to the rounding of the words.
+
+    They are turned if the flag says so.
+    """
     spans = VectorAdapter().compute(pieces)
     sign = np.where(pieces.flip, -1.0, 1.0)[:, np.newaxis]
     left, right = sign * pieces.left.values, sign * pieces.right.values
     largest = np.maximum(np.abs(left), np.abs(right)).max(axis=1)
     scale = 2.0 ** np.clip(np.floor(-np.log2(np.maximum(largest, 2.0**-30))), 0, SpanHalver.LARGEST_SHIFT)
     step = spans.step * (2.0**-spans.exponent * (spans.length - 1))[:, np.newaxis]
-    # A power of two may be shifted one place less.
+    # A power of two may be shifted by one place less.
     usual = np.log2(largest) % 1 > 1e-6
     assert usual.mean() > 0.98
     scale = scale[:, np.newaxis] * 2.0**17 * (1 - 2.0**-14)
     assert np.abs(spans.start - left * scale)[usual].max() <= 0.5 + 2.0**-9
-    # The ends of geometry are cut to 26 fraction bits: 7 places up that is a quarter of a step.
+    # The ends of geometry are cut to 26 fraction bits. After a shift by 7 places this is a quarter of a step.
     error = np.abs(spans.start + step - right * scale)[usual]
     change = np.maximum(np.abs(step).max(axis=1, keepdims=True) * 2.0**-17, 1 / 16)[usual]
     assert (error <= 0.5 + change + 0.25 + 1 / 8).all()
@@ -46,11 +49,14 @@ def test_vectors_are_in_proportion(pieces):
 
 
 def test_no_pixel_reaches_1(pieces):
-    """Not the last one of a span either, with its rounded step: there z would wrap, without a highlight."""
+    """The last pixel of a span does not reach 1 either, with its rounded step.
+
+    There z would wrap, and the highlight would be lost.
+    """
     left, right = (end.codes.copy() for end in (pieces.left, pieces.right))
     chosen = np.flatnonzero(pieces.length > 2)
     shift = np.arange(len(chosen)) % 8
-    # From anywhere to 1, or -1, less a step of N/W, times a power of two.
+    # Ends go from anywhere to 1, or -1, less a step of N/W, times a power of two.
     right[chosen, 2] = (SPAN_NORMAL.max_code >> shift) * np.where(shift < 4, 1, -1)
     left[chosen, 2] = right[chosen, 2] // 2 + (left[chosen, 2] >> (shift + 3))
     for end in (left, right):
@@ -65,7 +71,7 @@ def test_no_pixel_reaches_1(pieces):
 
 
 def test_a_step_of_every_size():
-    """The exponent is the largest with which the step is under 1; 15 at most."""
+    """The exponent is the largest with which the step is under 1, and at most 15."""
     size = np.arange(1, 33)
     codes = np.zeros((32, 3), dtype=np.int64)
     codes[:, 1] = -(1 << (size - 1))

@@ -10,7 +10,8 @@ from blysk.golden.number.unit_vector import COMPONENT, ONE
 
 
 def vectors(rng, count):
-    """Of all directions and of lengths over 2^-16; along axes and planes; the ends of the words."""
+    """Vectors of all directions and of lengths over 2^-16, along axes and planes, and at the ends of the
+    words."""
     v = rng.normal(size=(count, 3)) * 2.0 ** rng.uniform(0, 15, (count, 1))
     v[::5, rng.integers(0, 3)] = 0
     v /= np.abs(v).max(axis=1, keepdims=True)
@@ -23,7 +24,7 @@ def vectors(rng, count):
 
 
 def test_bounds():
-    """Length and direction."""
+    """Length and direction are within their bounds."""
     v = vectors(np.random.default_rng(1), 400_000)
     normal, lost = VectorNormaliser().compute(Fixed(SPAN_NORMAL, v), np.zeros(len(v), dtype=bool))
     assert lost.tolist() == [(row == 0).all() for row in v]
@@ -35,7 +36,7 @@ def test_bounds():
 
 
 def test_fit_of_the_table():
-    """Both lines of a segment leave no more than `FIT` of the factor."""
+    """At both ends of a segment the fit leaves at most `FIT` of the factor."""
     p = VectorNormaliser()
     s = (np.arange(1 << 18, 1 << 20) + 0.5) * 2.0**-20
     c0, c1 = (c.values[np.floor(s * 512).astype(int)] for c in p.coefficients)
@@ -45,7 +46,7 @@ def test_fit_of_the_table():
 
 
 def test_factor_of_every_square():
-    """No word of the factor wraps or saturates: of all squared lengths from 1/4 to 1, as rounded."""
+    """No word of the factor wraps or saturates, for all rounded squared lengths from 1/4 to 1."""
     p = VectorNormaliser()
     s = np.arange(1 << 18, 1 << 20)
     e = p.factor(Fixed(UQ(0, 22), s << 2))
@@ -56,7 +57,10 @@ def test_factor_of_every_square():
 
 
 def test_lost_and_flipped():
-    """What has no direction is flagged; flipped vectors are negative to the rounding of ties."""
+    """A vector without direction is flagged.
+
+    Flipped vectors are the negatives, except for the rounding of ties.
+    """
     lost = VectorNormaliser().compute(Fixed(SPAN_NORMAL, np.array([[1023, -1024, 5], [1024, 0, 0]])), [0, 0])[
         1
     ]
@@ -69,6 +73,6 @@ def test_lost_and_flipped():
 
 
 def test_refusal():
-    """Another format."""
+    """Another format is refused."""
     with pytest.raises(ValueError, match=r"^operands must be SQ\(1, 26\), not SQ\(1, 17\)$"):
         VectorNormaliser().compute(Fixed(COMPONENT, np.zeros((1, 3), dtype=np.int64)), [False])

@@ -27,10 +27,11 @@ NORMAL_METHODS = [name for name, method in METHODS.items() if isinstance(method,
 # `quantise` moves a vector by half a step along itself and by sqrt(3) steps across.
 MOVED = (0.5 + np.sqrt(3)) * STEP
 
-# Largest error of a component of a normal, in steps of 2^-17, that the devices promise over spans to 40
-# degrees and 64 pixels: the last rounding, 1/2; ends a step off at most, felt 1.25 times, and 1.06 in the
-# middle; the middle normal, half a step; dt, 2^-17 of |P| + 4 |G|. Of `renormalise` w, half a step, over the
-# line's length; its result; and the factor, as `LENGTH_ERROR` has it.
+# Largest error of a component of a normal that the devices promise, in steps of 2^-17, for spans of up to 40
+# degrees and 64 pixels. It is a sum: the last rounding, 1/2; ends, which are off by at most a step and count
+# 1.25 times, 1.06 times in the middle; the middle normal, half a step; dt, 2^-17 of |P| + 4 |G|. For
+# `renormalise` it is the rounding of w, half a step, divided by the line's length; the rounding of the
+# result; and the factor, as `LENGTH_ERROR` says.
 NORMAL_STEPS = {
     "linear": 0.5 + 1 + 0.7,
     "renormalise": 0.5 / np.cos(np.radians(20)) + Renormaliser.LENGTH_ERROR / np.sqrt(3) / STEP,
@@ -55,7 +56,8 @@ def compute(interpolator, left, right, length, direction, halfway):
 
 
 def end_words(interpolator, left, right):
-    """Ends of spans in the format that the method takes: unit normals, or a line between two of length 1."""
+    """Ends of spans in the format that the method takes: unit normals, or a line between two normals of
+    length 1."""
     codes = quantise_line(left, right) if interpolator.curve_is_exact else (quantise(left), quantise(right))
     return [Fixed(interpolator.END_FORMAT, end) for end in codes]
 
@@ -82,7 +84,7 @@ def test_formats(method):
 
 @pytest.mark.parametrize("method", NORMAL_STEPS)
 def test_normals(method):
-    """Each component against the method's curve in float64, `exact_normals`."""
+    """Each component is compared with the method's curve in float64, `exact_normals`."""
     rng = np.random.default_rng(2)
     interpolator = METHODS[method]
     left, right, length = spans(rng)
@@ -99,13 +101,13 @@ def test_normals(method):
 @pytest.mark.parametrize("operand", ["cosine", "one_minus_cosine"])
 @pytest.mark.parametrize("method", NORMAL_METHODS)
 def test_products_are_those_of_the_normals(method, operand):
-    """Exact integers: N.L and N.H whole, the chord cut to 25 fraction bits."""
+    """N.L and N.H are compared as exact integers, and the chord as an integer cut to 25 fraction bits."""
     rng = np.random.default_rng(3)
     interpolator = type(METHODS[method])(**{**METHODS[method].__dict__, "operand": operand})
     assert interpolator.uses_chord == (operand == "one_minus_cosine")
     left, right, length = spans(rng, 300, 20.0)
     direction, halfway = vectors(rng, 2)
-    # A light near the spans: u is under 1/2, where the chord is exact.
+    # This light is near the spans, so u is under 1/2, where the chord is exact.
     halfway = left[:2]
     operands = compute(interpolator, left, right, length, direction, halfway)
     normals, _ = interpolator.normals(*end_words(interpolator, left, right), length)
@@ -121,14 +123,15 @@ def test_products_are_those_of_the_normals(method, operand):
 
 
 def test_angular_operands():
-    """``1 - cos`` along the great circle: the devices' bounds, and what rounding moves a vector, `MOVED`."""
+    """``1 - cos`` along the great circle is within the devices' bounds and the effect of rounding,
+    `MOVED`."""
     rng = np.random.default_rng(5)
     left, right, length = spans(rng)
     direction, halfway = vectors(rng, 2)
     operands = compute(METHODS["angular"], left, right, length, direction, halfway)
     span, t = places(length)
     normals = interpolate("slerp", left[span], right[span], t)
-    # The weights of the two ends add up to 1/cos(psi/2) at most.
+    # The weights of the two ends add up to at most 1/cos(psi/2).
     bound = MOVED * (1 / np.cos(np.radians(20)) + 1)
     bound += np.max(AngularSetup.error(np.linspace(0.01, 40, 4000))) + HighlightCosine.ERROR + 2.0**-16
     assert np.abs(operands.cosine.values - normals @ direction.T).max() <= bound
@@ -139,7 +142,7 @@ def test_angular_operands():
 @pytest.mark.parametrize("method", FROM_NORMALS)
 @pytest.mark.parametrize("length", [1, 2, 3, 16, 4095])
 def test_stiff_equal_normals(method, length):
-    """Angle 0: every pixel of a span is as its first."""
+    """With equal normals every pixel of a span equals its first."""
     rng = np.random.default_rng(length)
     left, _ = pairs_at(rng, 3, 0.0)
     lengths = np.full(3, length)
@@ -150,7 +153,7 @@ def test_stiff_equal_normals(method, length):
         np.testing.assert_array_equal(values, values[:, :1].repeat(length, axis=1))
 
 
-# The recurrence as drawn drifts away from its end; its own tests say how far.
+# The recurrence as drawn drifts away from its end. Its own tests say how far.
 @pytest.mark.parametrize("method", FROM_NORMALS)
 @pytest.mark.parametrize("angle", [1e-4, 1.0, 14.0])
 def test_stiff_ends(method, angle):
@@ -162,7 +165,7 @@ def test_stiff_ends(method, angle):
     for length in (2, 3, 16, 1000):
         operands = compute(METHODS[method], left, right, np.full(200, length), direction, halfway)
         cosine = operands.cosine.values.reshape(200, length)[:, [0, -1]]
-        # Two vectors off, `ONE_SQUARED` in place of 1, and a step of the normal across.
+        # Both vectors are off, `ONE_SQUARED` stands for 1, and the normal is off by a step across.
         assert np.abs(cosine - ends).max() <= 2 * MOVED + 2.0**-16 + np.sqrt(3) * STEP
 
 
@@ -194,7 +197,7 @@ def test_flag(method, narrow, out_of_range):
 
 
 def test_flag_of_linear_normals():
-    """A component of the difference of 1 or more."""
+    """A component of the difference of 1 or more sets the flag."""
     rng = np.random.default_rng(9)
     left, right = pairs_at(rng, 2000, rng.uniform(0, 180, 2000))
     operands = compute(METHODS["linear"], left, right, np.full(2000, 2), *vectors(rng, 1))
@@ -210,7 +213,7 @@ def test_refuses():
             make(operand="sine")
     with pytest.raises(ValueError, match=r"'spline'"):
         QuadraticInterpolator(form="spline")
-    # What a method has to state is known where it is made.
+    # A method that does not state its facts is refused when it is made.
     with pytest.raises(TypeError, match=r"abstract methods? .*\bcut\b.*\bfilled\b"):
         Interpolator()
     with pytest.raises(TypeError, match=r"abstract methods? .*\bcompute\b"):

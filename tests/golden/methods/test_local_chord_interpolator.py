@@ -20,26 +20,26 @@ EXPONENTS = [1, 2, 3, 5, 10, 20, 50, 100, 200, 500, 1000]
 
 
 class Surface:
-    """Straight lines of points with turning normals, lit by point lights, seen by a near viewer."""
+    """Straight lines of points with turning normals, lit by point lights and seen by a near viewer."""
 
     def __init__(self, rng, count, lights, turn, reach, exponent, opposite=False):
         self.start = rng.normal(size=(count, 3))
         self.step = reach * normalise(rng.normal(size=(count, 3)))
-        # At about 3 units, on all sides.
+        # These lights are at about 3 units, on all sides.
         self.lights = rng.uniform(2, 4, (count, lights, 1)) * normalise(rng.normal(size=(count, lights, 3)))
         self.viewer = rng.uniform(2, 4, (count, 1)) * normalise(rng.normal(size=(count, 3)))
         if opposite:
-            # Behind the point that the viewer sees, so that L is nearly -V, and H turns fast.
+            # This light is behind the point that the viewer sees, so L is nearly -V, and H turns fast.
             spread = 10.0 ** rng.uniform(-2, 0.3, (count, lights, 1)) * rng.normal(size=(count, lights, 3))
             self.lights = spread - self.viewer[:, np.newaxis] * rng.uniform(0.5, 2, (count, lights, 1))
-        # Normals about the H of the first light, so that half of the spans see its highlight.
+        # These normals are about the H of the first light, so half of the spans have its highlight.
         towards = normalise(normalise(self.lights[:, 0]) + normalise(self.viewer))
         near = rng.normal(size=(count, 3)) * rng.choice([0.5, 2, 30], (count, 1)) / np.sqrt(exponent)
         self.left = normalise(towards + near)
         self.right = normalise(self.left + turn * normalise(rng.normal(size=(count, 3))))
 
     def at(self, span, t):
-        """N·L and 1 - N·H at places of spans, each vector normalised there."""
+        """N·L and 1 - N·H at places of spans, with each vector normalised at the place."""
         t = t[:, np.newaxis]
         normal = normalise((1 - t) * self.left[span] + t * self.right[span])[:, np.newaxis]
         point = self.start[span] + t * self.step[span]
@@ -49,7 +49,10 @@ class Surface:
         return (normal * direction).sum(axis=2), ((normal - halfway) ** 2).sum(axis=2) / 2
 
     def turns(self):
-        """Whether L and V move too far for their H; N, V and L are made not to turn too far."""
+        """Whether L and V move so far that H turns too much.
+
+        N, V and L are made so that they do not turn too far.
+        """
         viewers, directions = [], []
         for point in (self.start, self.start + self.step):
             viewers.append(normalise(self.start + self.viewer - point)[:, np.newaxis])
@@ -65,13 +68,14 @@ class Surface:
 
 
 def test_operands():
-    """Against the quadratics through the exact values, in the bounds of the setup and the last rounding."""
+    """Operands are within the bounds of the setup and the last rounding of the quadratics through the exact
+    values."""
     rng = np.random.default_rng(1)
     surface = Surface(rng, 4000, 2, 0.1, 0.1, 20)
     length = rng.integers(1, 400, 4000)
     values = surface.values()
     operands = METHOD.compute_values(values, length)
-    # A light nearly opposite to the viewer turns H a great deal.
+    # If a light is nearly opposite to the viewer, H turns a great deal.
     assert operands.out_of_range.mean() < 0.01
     kept = ~operands.out_of_range[pixels_of(length)[0]]
     assert operands.cosine.format == METHOD.COSINE_FORMAT == SQ(2, 25)
@@ -79,7 +83,7 @@ def test_operands():
     assert operands.cosine.codes.shape == operands.highlight.codes.shape == (length.sum(), 2)
     p, step = METHOD.setup, 2.0**-26
     cosine, u = METHOD.exact_operands(values, length)
-    # A quadratic may dip under 0, the operand not.
+    # A quadratic may be under 0, and the operand may not.
     assert u.min() < 0
     found = cosine, np.maximum(u, 0)
     for operand, curve, bound in zip(
@@ -91,7 +95,7 @@ def test_operands():
 
 
 def test_mixed_lengths_do_not_touch_each_other():
-    """The pixels of each span are those of the span alone, in the order of the spans."""
+    """In spans of mixed lengths, the pixels of each span equal those of the span alone."""
     rng, count = np.random.default_rng(4), 120
     values, length = Surface(rng, count, 1, 0.3, 0.3, 20).values(), mixed_lengths(rng, count)
     together = METHOD.compute_values(values, length)
@@ -106,7 +110,10 @@ def test_mixed_lengths_do_not_touch_each_other():
 
 
 def test_exact_operands():
-    """The quadratics, written out, at every pixel; a span of one pixel has its first value."""
+    """The exact operands equal the written-out quadratics at every pixel.
+
+    A span of one pixel has its first value.
+    """
     rng = np.random.default_rng(2)
     surface = Surface(rng, 50, 3, 0.2, 0.2, 20)
     length = rng.integers(1, 9, 50)
@@ -124,7 +131,7 @@ def test_exact_operands():
 
 @pytest.mark.parametrize("length", [1, 2, 3, 16, 4095])
 def test_stiff_equal_values(length):
-    """Every pixel of a span is as its first, to the last rounding."""
+    """With equal values every pixel of a span equals its first, up to the last rounding."""
     rng = np.random.default_rng(length)
     diffuse, highlight = rng.uniform(-1, 1, (40, 2, 1)), rng.uniform(0, 2, (40, 2, 1))
     diffuse[:2], highlight[:2] = [[[-1.0]], [[1.0]]], [[[0.0]], [[2.0]]]
@@ -137,7 +144,7 @@ def test_stiff_equal_values(length):
 
 
 def test_peak_in_the_middle_and_at_the_ends():
-    """u = 0 at a pixel gives the operand 0, to what G is rounded by; it never turns below."""
+    """u = 0 at a pixel gives the operand 0, up to the rounding of G. It never goes below 0."""
     values = SpanValues.quantise(
         np.full((2, 1, 3), 0.7), np.array([[[1e-3, 0, 1e-3]], [[0, 1e-3, 4e-3]]], dtype=float)
     )
@@ -151,7 +158,7 @@ def test_peak_in_the_middle_and_at_the_ends():
 
 @pytest.mark.parametrize("model", MODELS)
 def test_highlight_tolerance(model):
-    """What the tolerance costs, by the steepest chord of each model in float64, times 1.25."""
+    """The tolerance is the steepest chord of each model in float64, times 1.25."""
     for n in EXPONENTS:
         worst = 0.0
         for end in (2.0, min(2.0, 12 / n)):
@@ -168,7 +175,7 @@ def exact(values):
 
 
 def sizes(values):
-    """Of P and G."""
+    """Sizes of P and G."""
     left, middle, right = values
     curvature = 2 * (left + right - 2 * middle)
     return np.abs(right - left - curvature), np.abs(curvature)
@@ -176,7 +183,7 @@ def sizes(values):
 
 @pytest.mark.parametrize("model", MODELS)
 def test_is_lit(model):
-    """Where it says no there is no term over a quarter of an LSB."""
+    """Where `is_lit` says no, there is no term over a quarter of an LSB."""
     for n in EXPONENTS:
         u = np.linspace(0, 2, 20_001)
         dark = ~METHOD.is_lit(n, u)
@@ -187,7 +194,8 @@ def test_is_lit(model):
 @pytest.mark.parametrize("opposite", [False, True])
 @pytest.mark.parametrize("exponent", [1000, *(pytest.param(n, marks=pytest.mark.long) for n in (1, 10, 100))])
 def test_total_error(exponent, opposite):
-    """Fit and arithmetic against vectors normalised at each pixel, over spans that pass the tolerances."""
+    """Fit and arithmetic are compared with vectors normalised at each pixel, in spans that pass the
+    tolerances."""
     rng = np.random.default_rng(exponent)
     count = 8_000
     turn, reach = rng.uniform(0, 0.3, (count, 1)), 10.0 ** rng.uniform(-2 - opposite, 0, (count, 1))
@@ -203,7 +211,7 @@ def test_total_error(exponent, opposite):
         miss_of_f = np.maximum(miss_of_f, np.abs(np.tensordot(weights, f, 1) - exact_f))
         miss_of_u = np.maximum(miss_of_u, np.abs(np.tensordot(weights, u, 1) - exact_u))
     slope, curvature = sizes(u)
-    # The vertex of a quadratic is at most a quarter from one of the three.
+    # The vertex of a quadratic is at most a quarter of the span from one of the three places.
     least = np.maximum(u.min(axis=0) - curvature / 16 - miss_of_u, 0)
     miss_of_u = METHOD.MARGIN * miss_of_u + ChordSetup().highlight_error(slope, curvature)
     good &= (miss_of_u <= METHOD.highlight_tolerance(exponent, least)).all(axis=1)

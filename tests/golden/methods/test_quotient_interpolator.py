@@ -1,4 +1,4 @@
-"""The quotient method against float64: its bound on every span, and the corners of its rules."""
+"""The quotient method against float64: its bound on every span, and the limits of its rules."""
 
 from functools import partial
 
@@ -18,7 +18,10 @@ TABLE = 0.1 / 255
 
 
 def _ends(rng, count, ratio, degrees):
-    """Vectors of spans, some about the z axis; lengths to a ratio, angles to a number of degrees."""
+    """Vectors of spans, some about the z axis.
+
+    Their lengths have a ratio up to a limit, their angles are up to a number of degrees.
+    """
     left = normalise(
         np.array([0, 0, 1.0]) + rng.normal(size=(count, 3)) * 10.0 ** rng.uniform(-3, 1, (count, 1))
     )
@@ -29,7 +32,10 @@ def _ends(rng, count, ratio, degrees):
 
 
 def _found(method, frame, left, right, length, exponents):
-    """N·L and terms of the exponents, found and exact, and N·L; pixels with a highlight near 0 left out."""
+    """N·L and terms of the exponents, as found and exact, and the exact N·L.
+
+    Pixels with a highlight near N·H = 0 are left out.
+    """
     spans = method.spans(1, True)
     kinds = (1, frame.cosine, 1) if method.mirror else (1, 1, 1)
 
@@ -60,7 +66,7 @@ def _found(method, frame, left, right, length, exponents):
 
 @pytest.mark.parametrize("mirror", [False, True])
 def test_bound_of_every_span(mirror):
-    """Errors of N·L and of terms are within the bound of their span, 1 to 4095 pixels."""
+    """In spans of 1 to 4095 pixels the errors of N·L and of terms are within the bound of their span."""
     rng = np.random.default_rng(11)
     method = QuotientInterpolator(mirror)
     for length, count in ((1, 200), (3, 200), (17, 100), (257, 20), (4095, 4)):
@@ -73,7 +79,7 @@ def test_bound_of_every_span(mirror):
             span = np.repeat(np.arange(count), length)
             for n, (term, true) in terms.items():
                 off = np.abs(term - true)
-                # Where the angle passes 90 degrees a power of 1 has its kink.
+                # At 90 degrees a power of 1 has a kink.
                 off[np.abs(height) < 1e-5] = 0
                 worst = int(span[off.argmax()])
                 errors = QuotientErrors.of(vectors[worst : worst + 1], lengths[:1], mirror)
@@ -86,7 +92,10 @@ def test_bound_of_every_span(mirror):
 
 @pytest.mark.parametrize("mirror", [False, True])
 def test_bound_of_a_further_light(mirror):
-    """Its words are rounded by themselves, and q by the first's: up to 1 LSB near N·H = 0 at n = 1."""
+    """The words of a further light are rounded by themselves, and q comes from the first light.
+
+    Near N·H = 0 at n = 1 this makes up to 1 LSB.
+    """
     rng = np.random.default_rng(5)
     method, count, length = QuotientInterpolator(mirror), 1500, 9
     spans, lobe = method.spans(2, True), QuotientLobe(PHONG if mirror else BLINN)
@@ -126,7 +135,8 @@ def test_bound_of_a_further_light(mirror):
 
 @pytest.mark.parametrize("mirror", [False, True])
 def test_errors_are_those_of_the_guide(mirror):
-    """Largest error of terms found in 2,000 spans to 1:2 and 90 degrees, 257 pixels at most, in LSB."""
+    """The guide states the largest error of terms in 2,000 spans up to 1:2, 90 degrees and 257 pixels, in
+    LSB."""
     rng = np.random.default_rng(12)
     method, count = QuotientInterpolator(mirror), 2000
     length = np.maximum((2 ** rng.uniform(1.6, 8, count)).astype(int), 3)
@@ -147,7 +157,8 @@ def _corner(light, viewer, left, right, length, mirror):
 @pytest.mark.parametrize("mirror", [False, True])
 @pytest.mark.parametrize("length", [1, 3, 4095])
 def test_corners(mirror, length):
-    """L = V, a light behind the horizon, the terminator, steps under a unit, m clamped at the peak."""
+    """The limits are L = V, a light behind the horizon, the terminator, steps under a unit, and m clamped at
+    the peak."""
     z, x = (0.0, 0.0, 1.0), (1.0, 0.0, 0.0)
     behind = normalise(np.array([1.0, 0.0, -0.9]))
     cases = [
@@ -169,7 +180,10 @@ def test_corners(mirror, length):
 
 
 def test_an_opposite_viewer():
-    """L = -V: Blinn's model has no H; R·V is -1 + 2 (N x L)^2, highest where N is across L."""
+    """With L = -V Blinn's model has no H.
+
+    R·V is -1 + 2 (N x L)^2, which is largest where N is perpendicular to L.
+    """
     _, cosine, exact, terms, height = _corner((1, 0, 0), (-1, 0, 0), (0.1, 1, 0), (-0.1, 1, 0.2), 17, True)
     assert np.abs(cosine - exact).max() < 1e-4
     for term, true in terms.values():
@@ -177,7 +191,7 @@ def test_an_opposite_viewer():
 
 
 def test_vectors_through_0_are_flagged():
-    """A span that was not cut where it should have been is counted."""
+    """A span that should have been cut and was not is counted."""
     method = QuotientInterpolator()
     spans = method.spans(1, True)
     ends = np.array([[1.0, 0, 0], [0, 0, 1.0]])

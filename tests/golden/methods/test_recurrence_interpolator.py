@@ -32,7 +32,7 @@ def errors(interpolator, left, right, length, direction, halfway):
 
 @pytest.mark.parametrize("lights", [1, 2])
 def test_operands_keep_the_bound(lights):
-    """Spans of all lengths and angles in one call, each against its own bound."""
+    """Spans of all lengths and angles are computed in one call, and each keeps its own bound."""
     rng = np.random.default_rng(1)
     degrees = np.r_[np.zeros(20), 10.0 ** rng.uniform(-4, 0, 100), rng.uniform(0, 90, 280)]
     left, right = (quantise(v) for v in pairs_at(rng, 400, degrees))
@@ -43,7 +43,7 @@ def test_operands_keep_the_bound(lights):
     worst, found = errors(interpolator, left, right, length, direction, halfway)
     assert found.cosine.shape == found.highlight.shape == (length.sum(), lights)
     assert not found.out_of_range.any()
-    # The curve follows the codes' lengths, which are off by up to 2^-17 or so, and so does the angle.
+    # The curve follows the lengths of the codes, which are off by up to about 2^-17. So does the angle.
     assert np.all(worst <= interpolator.setup.error(length, np.radians(degrees)) + 2.0**-16)
 
 

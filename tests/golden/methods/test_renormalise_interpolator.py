@@ -23,11 +23,11 @@ from blysk.golden.reference.scene import Scene
 METHOD = RenormaliseInterpolator()
 STEP = METHOD.END_FORMAT.step
 LINE_ERROR = LineSetup.ERROR + np.sqrt(3) * STEP
-"""Of a pixel's vector, before it is renormalised."""
+"""Error of a pixel's vector before it is renormalised."""
 
 
 def lines(rng, count, degrees, proportion):
-    """Codes of ends at an angle, the shorter down to a proportion of the longer."""
+    """Codes of ends at an angle. The shorter end has at least a proportion of the length of the longer."""
     left, right = pairs_at(rng, count, degrees)
     short = proportion ** rng.random((2, count, 1))
     return quantise_line(left * short[0], right * short[1])
@@ -44,9 +44,10 @@ def pixels(left, right, length):
 @pytest.mark.parametrize("proportion", [1, 0.5, 1 / 16, 1 / 100])
 @pytest.mark.parametrize("degrees", [0, 1e-4, 1, 45, 90, 150])
 def test_normals_of_true_lines(degrees, proportion):
-    """Spans of every length; every pixel within the line's error over its length, and the renormaliser's own.
+    """Every pixel is within the line's error, divided by its length, and the renormaliser's error.
 
-    The interpolated vector of a pixel is never the bisector's of unit ends but where both ends are as long.
+    Spans have every length. The interpolated vector of a pixel equals that of unit ends only if both ends are
+    as long.
     """
     rng = np.random.default_rng(int(degrees * 10))
     left, right = lines(rng, 200, degrees, proportion)
@@ -61,7 +62,7 @@ def test_normals_of_true_lines(degrees, proportion):
 
 
 def test_flag():
-    """Spans with a pixel whose vector has no component of 2^-8, and no others."""
+    """Exactly those spans are flagged that have a pixel whose vector has no component of 2^-8."""
     rng = np.random.default_rng(6)
     left, right = lines(rng, 5000, rng.uniform(175, 180, 5000), 0.1)
     length = rng.integers(1, 200, 5000)
@@ -80,7 +81,8 @@ def test_flag():
 
 
 def test_operand_error():
-    """The bound of both operands of ends of unit length, at every angle, highlight and all."""
+    """The bound of both operands holds for ends of unit length, at every angle, with and without
+    highlights."""
     rng = np.random.default_rng(7)
     for degrees in (0, 20, 90, 120, 160):
         left, right = (codes << 5 for codes in code_pairs_at(rng, 300, degrees))
@@ -101,7 +103,7 @@ def test_operand_error():
 
 
 def torus(around, along, radius=0.45):
-    """A coarse torus about the y axis with the exact normals of its vertices."""
+    """A coarse torus about the y axis, whose vertices have exact normals."""
     u, v = np.meshgrid(*(np.arange(n) * (2 * np.pi / n) for n in (around, along)), indexing="ij")
     normals = np.stack([np.cos(u) * np.cos(v), np.sin(v), np.sin(u) * np.cos(v)], axis=-1)
     vertices = radius * normals + np.stack([np.cos(u), np.zeros_like(u), np.sin(u)], axis=-1)
@@ -113,7 +115,7 @@ def torus(around, along, radius=0.45):
 
 
 def close_torus(exponent):
-    """Twelve by seven, seen from so near that a span's ends are at depths 1:3 and more."""
+    """A torus of twelve by seven, seen from so near that the depths at a span's ends are 1:3 and more."""
     camera = Camera((0.4, 0.9, 1.9), (0.0, -0.1, 0.4), projection="perspective", field_of_view=85.0)
     material = Material((0.1,) * 3, (0.5,) * 3, (0.5,) * 3, exponent)
     return Scene(torus(12, 7), camera, 200, 150, material, (Light((0.5, 1.0, 0.8)),))
@@ -121,7 +123,7 @@ def close_torus(exponent):
 
 @pytest.mark.parametrize("exponent", [1, 30, 200])
 def test_frame_in_strong_perspective(exponent):
-    """Every pixel off the terminator is within 0.6 LSB of per-pixel normals, half an LSB of it rounding."""
+    """Every pixel off the terminator is within 0.6 LSB of exact normals; half an LSB of this is rounding."""
     scene = close_torus(exponent)
     design = preset("renormalise", "cosquad")
     frame = model_frame(scene, design)
@@ -144,7 +146,7 @@ def test_frame_in_strong_perspective(exponent):
 
 
 def test_frame_without_lengths_is_worse():
-    """Ends made unit vectors are the interpolation of textbooks: bands where the perspective is strong."""
+    """If the ends are made unit vectors, as in textbooks, bands appear where the perspective is strong."""
     scene = close_torus(30)
     design = preset("renormalise", "cosquad")
     frame = model_frame(scene, design)

@@ -1,8 +1,8 @@
 """Operands of the interpolators at peaks and terminators, within the bound that each method states.
 
 The reference is the method's own curve in float64, through the vectors of the codes. `stability` has the
-colours of all methods in all groups of stiff and extreme cases, the units' tests have wrong lengths and the
-ends of words.
+colours of all methods in all groups of stiff and extreme cases. The tests of the units have wrong lengths and
+the ends of words.
 """
 
 import itertools
@@ -19,7 +19,8 @@ from blysk.golden.reference.curves import interpolate
 
 STEP = COMPONENT.step
 ONE_VALUE = float(ONE_SQUARED.values)
-# Chords to H of normals that are not of unit length are no cosines; tests of their own have their bounds.
+# If normals do not have unit length, their chords to H are no cosines. Tests of their own have bounds for
+# these normals.
 NAMES = [
     name
     for name, method in METHODS.items()
@@ -34,7 +35,7 @@ def bound(method, length, degrees):
 
 
 def reference(method, left, right, length, vector):
-    """Cosines of the method's curve with a vector, at every pixel, in float64; the arguments are codes."""
+    """Cosines between the method's curve and a vector, at every pixel in float64. The arguments are codes."""
     left, right, vector = (np.asarray(v) / ONE for v in (left, right, vector))
     span, index = pixels_of(length)
     t = index / np.maximum(length - 1, 1)[span]
@@ -48,7 +49,7 @@ def reference(method, left, right, length, vector):
         # Opposite normals are flagged.
         middle = (a + b) / np.sqrt(np.maximum(2 * (1 + r), STEP))
         return (2 * (a + b) - 4 * middle) * t**2 + (4 * middle - b - 3 * a) * t + a
-    # The angle is that of the chord, so that the curve goes through both ends.
+    # The angle is that of the chord, so the curve goes through both ends.
     psi = 2 * np.arcsin(np.minimum(np.linalg.norm(right - left, axis=-1) / 2, 1))[span]
 
     def weight(t):
@@ -58,7 +59,7 @@ def reference(method, left, right, length, vector):
 
 
 def operands(method, left, right, length, vector):
-    """Cosines that a method finds for one vector as L and as H, in units of the code of length 1."""
+    """Cosines that a method finds for the same vector as L and as H, in units of the code of length 1."""
     interpolator = METHODS[method]
     format = interpolator.END_FORMAT
     shift = format.fraction_bits - COMPONENT.fraction_bits
@@ -71,7 +72,8 @@ def operands(method, left, right, length, vector):
 
 
 def turned(rng, degrees, at, off=0.0):
-    """A span about a fixed vector H: its peak at the share ``at``, H ``off`` degrees off its plane."""
+    """A span about a fixed vector H: its peak is at the share ``at``, and H is ``off`` degrees away from its
+    plane."""
     psi = np.radians(degrees)
     axes = np.linalg.qr(rng.normal(size=(3, 3)))[0]
     along, side, across = axes
@@ -83,7 +85,10 @@ def turned(rng, degrees, at, off=0.0):
 @pytest.mark.parametrize(("length", "pixel"), [(2, 0), (3, 1), (17, 8), (17, 16), (16, 7.5), (513, 256)])
 @pytest.mark.parametrize("method", NAMES)
 def test_stiff_peak(method, length, pixel):
-    """On a pixel, at an end, in the middle of all; exactly between two: the bound holds at every pixel."""
+    """The peak is on a pixel, at an end, in the middle of the span, and exactly between two pixels.
+
+    The bound holds at every pixel.
+    """
     rng, lengths = np.random.default_rng(length), np.array([length])
     for degrees, off in itertools.product(ANGLES, (0, 0.5, 30)):
         largest = bound(method, length, degrees)
@@ -93,18 +98,18 @@ def test_stiff_peak(method, length, pixel):
         assert not found.out_of_range.any()
         assert np.abs(cosine - exact).max() <= largest
         assert np.abs(highlight - np.clip(exact, -1, 1)).max() <= largest + 2.0**-25
-        # Around the peak the curve is even: two pixels as far from it on either side are alike.
+        # The curve is symmetric about the peak, so two pixels at equal distances from it have equal values.
         around = [int(np.floor(pixel)), int(np.ceil(pixel))]
         if 0 < pixel < length - 1:
             around = [around[0] - (around[0] == pixel), around[1] + (around[1] == pixel)]
-            # The ends' rounding turns the plane and moves the peak.
+            # The rounding of the ends turns the plane and moves the peak.
             assert abs(highlight[around[0]] - highlight[around[1]]) <= 2 * largest + 4 * STEP
 
 
 @pytest.mark.parametrize("degrees", ANGLES)
 @pytest.mark.parametrize("method", NAMES)
 def test_stiff_terminator(method, degrees):
-    """N.L through 0 in the span: the sign is right where N.L is over the bound, and no error elsewhere."""
+    """N.L goes through 0 in the span. Its sign is right wherever N.L is over the bound."""
     length = np.array([64])
     largest = bound(method, 64, degrees)
     axes = np.linalg.qr(np.random.default_rng(3).normal(size=(3, 3)))[0]

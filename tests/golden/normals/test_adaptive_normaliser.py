@@ -28,14 +28,14 @@ def run(parameters, seed, angles, lengths):
 
 
 def errors(left, right, span, pixel, normal, levels, lengths):
-    """Largest component's distance of every pixel from the straight line of its segment."""
+    """Largest distance of a component from the straight line of its segment, for every pixel."""
     t = pixel / np.maximum(lengths - 1, 1)[span]
     exact = straight_lines(left[span] / ONE, right[span] / ONE, levels[span], t) * SCALE
     return np.abs(normal.values - exact).max(axis=1)
 
 
 def assert_ends(normal, left, right, lengths):
-    """First and last pixels have the spans' own normals."""
+    """Check that first and last pixels have the spans' own normals."""
     last = np.cumsum(lengths) - 1
     np.testing.assert_array_equal(normal.codes[last - lengths + 1], left)
     np.testing.assert_array_equal(normal.codes[last][lengths > 1], right[lengths > 1])
@@ -47,7 +47,7 @@ def assert_ends(normal, left, right, lengths):
     ids=str,
 )
 def test_error_under_its_bound(parameters, low, high):
-    # A span that the unit does not divide shows its own arithmetic all the same.
+    # A span that the unit does not divide still has arithmetic errors.
     lengths = np.tile(LENGTHS, 8)
     angles = np.random.default_rng(1).uniform(low, high, len(lengths))
     left, right, span, pixel, normal, out_of_range, levels = run(parameters, 2, angles, lengths)
@@ -55,7 +55,7 @@ def test_error_under_its_bound(parameters, low, high):
     error = errors(left, right, span, pixel, normal, levels, lengths)
     bounds = np.array([parameters.error(k, low > 1) for k in range(parameters.depth + 1)])
     assert np.all(error <= bounds[levels][span])
-    # Of every number of levels, the bound takes the widest span that asks for it.
+    # For every number of levels, the bound is that of the widest span that needs this number.
     assert (error / bounds[levels][span]).max() >= 0.3
 
 
@@ -67,7 +67,8 @@ def test_length_and_direction_keep_their_word(parameters):
     assert not out_of_range.any()
     vectors = normal.values / SCALE
     length = np.linalg.norm(vectors, axis=1)
-    # Three components off by the arithmetic error, and the code vectors at the ends by their own rounding.
+    # Three components are off by the arithmetic error, and the code vectors at the ends by their own
+    # rounding.
     rounding = np.sqrt(3) * parameters.error(parameters.depth, bool(angles.max() > 45)) + 2.0**-17
     assert length.min() >= 1 - parameters.threshold - 2.0**-19 - rounding
     assert length.max() <= 1 + rounding
@@ -89,8 +90,8 @@ def test_levels_are_the_fewest(threshold):
     def sagitta(k):
         return 1 - np.cos(np.radians(angles) / 2.0 ** (k + 1))
 
-    # The word of u is rounded by 2^-18, a quarter of which is the sagitta's, and so is the rounding of two
-    # unit vectors to code vectors, of up to 2^-16.
+    # The word of u is rounded by 2^-18, and a quarter of this counts in the sagitta. The rounding of two unit
+    # vectors to codes adds up to 2^-16 in the same way.
     slack = (2.0**-18 + 2.0**-16) / 4 / 4.0**levels
     assert np.all(sagitta(levels) <= threshold + slack)
     divided = levels > 0
@@ -122,7 +123,10 @@ def test_stiff_equal_normals_stay():
     ("degrees", "miss", "length"), [(1, 0.00015, 1.0003), (10, 0.15, 1.03), (45, 8.2, 1.47)]
 )
 def test_cost_of_the_published_extrapolation(degrees, miss, length):
-    """The end on the chord's continuation at the next power of two, then normalised without an error."""
+    """The published form takes the end on the chord's continuation at the next power of two.
+
+    Here it is then normalised without an error.
+    """
     psi = np.radians(degrees)
     steps = np.arange(1, 4095)
     g = 2.0 ** np.ceil(np.log2(steps)) / steps
@@ -132,7 +136,7 @@ def test_cost_of_the_published_extrapolation(degrees, miss, length):
     last = np.degrees(np.arctan2(end[1], end[0])) / g
     assert (degrees - last).max() == pytest.approx(miss, rel=0.03)
     assert np.degrees(np.arctan2(2.0, 1 - 2.0)) == pytest.approx(116.6, abs=0.1)
-    # Ours gives the right end itself, to the bit.
+    # Our unit gives the right end to the bit.
     ends = quantise(np.array([[1.0, 0, 0], [np.cos(psi), np.sin(psi), 0]]))
     length = np.r_[2:100, 513:516, 4095]
     left, right = (np.tile(end, (len(length), 1)) for end in ends)
@@ -152,12 +156,14 @@ def test_stiff_spans_out_of_range_are_flagged(angle):
 @pytest.mark.parametrize("threshold", [1 / 8, 2.0**-10, 2.0**-14])
 @pytest.mark.parametrize("angle", [1, 44.9, 89.9])
 def test_stiff_drift_over_4095_pixels(threshold, angle):
-    """A step is cut by under 2^-32: over a segment of n pixels its end is low by under n 2^-32."""
+    """A step is cut by less than 2^-32, so a segment of n pixels is too low by less than n 2^-32 at its
+    end."""
     parameters, lengths = AdaptiveNormaliser(threshold), np.full(6, 4095)
     left, right, span, pixel, normal, _, levels = run(parameters, 9, angle, lengths)
     error = errors(left, right, span, pixel, normal, levels, lengths).max()
     assert error <= parameters.error(int(levels.max()), angle > 45)
-    # One segment, the longest way to drift, keeps within a step of the word and what its factors round off.
+    # A single segment has the longest drift. It keeps within a step of the word and the rounding of its
+    # factors.
     if not levels.any():
         assert error <= 2.0**-18 + 2 * np.sin(np.radians(angle) / 2) * 2.0**-16 + 4095 * 2.0**-32
 
@@ -165,7 +171,7 @@ def test_stiff_drift_over_4095_pixels(threshold, angle):
 @pytest.mark.parametrize("length", [3, 5, 16, 17, 4095])
 @pytest.mark.parametrize("angle", [1, 45, 89])
 def test_stiff_peaks(length, angle):
-    """N.H with H on a pixel and between two: the sagitta and the rounding are lost, no more."""
+    """With H on a pixel or between two, N.H loses only the sagitta and the rounding."""
     parameters, half = AdaptiveNormaliser(), np.radians(angle) / 2
     ends = quantise(np.array([[[np.cos(half), sign * np.sin(half), 0]] for sign in (-1, 1)]))
     normal, _, levels = parameters.compute(*component_words(*ends), np.array([length]))
@@ -179,14 +185,17 @@ def test_stiff_peaks(length, angle):
 
 
 def test_stiff_normals_of_no_unit_length():
-    """Words of any size come out at both ends as they went in, unless flagged; nothing fails in between."""
+    """Words of any size come out unchanged at both ends, unless they are flagged.
+
+    Nothing fails between the ends.
+    """
     rng = np.random.default_rng(10)
     parameters, lengths = AdaptiveNormaliser(), np.resize([2, 3, 16, 100], 300)
     short = pairs_of_length(rng, 300, 5.0, 1 - 1 / 256)
     for ends in (np.zeros((2, 300, 3), np.int64), word_ends(rng, 2, 300, 3), short):
         normal, out_of_range, _ = parameters.compute(*component_words(*ends), lengths)
         assert_ends(normal, *ends, lengths)
-    # Every normal between short ones is as short as they are, and by its sagitta.
+    # Every normal between short normals is as short as they are, and shorter by its sagitta.
     assert not out_of_range.any()
     size = np.linalg.norm(normal.values, axis=1)
     assert 1 - 3 / 256 < size.min() < 1 - 1 / 256

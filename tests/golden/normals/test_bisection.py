@@ -51,7 +51,7 @@ def test_error_under_its_bound(parameters, first_step):
     rng = np.random.default_rng(3)
     angles = np.r_[rng.uniform(low, high, 40_000), np.full(1000, low), np.full(1000, high)]
     left, right = codes(4, angles)
-    # Along an axis both components of a sum are as large as they get.
+    # Along an axis both components of a sum are as large as possible.
     left[:20] = [0, 0, ONE]
     right[:20] = left[:20] if not first_step else [0, ONE, 0]
     middle, _, out_of_range, exact, _ = bisect(parameters, left, right)
@@ -59,7 +59,7 @@ def test_error_under_its_bound(parameters, first_step):
     worst = np.abs(middle.values - exact).max()
     bound = parameters.error(first_step)
     assert worst <= bound
-    # Not loose: the bound takes a component of the sum as 2, and the roundings all at their worst.
+    # The bound is not much too large. It takes a component of the sum as 2, and all roundings at their worst.
     assert worst >= bound / 2.5
 
 
@@ -71,14 +71,14 @@ def test_arithmetic_error_under_its_bound(parameters, first_step):
     middle, _, _, _, r = bisect(parameters, left, right)
     factor = 0.5 + factor_of(parameters, r, np.full(len(r), first_step))
     same = (left + right) * COMPONENT.step * factor[:, np.newaxis]
-    # A factor that is too large takes a component near 1 out of the word.
+    # A factor that is too large makes a component near 1 leave its word.
     same = np.clip(same, -1, ONE * COMPONENT.step)
     worst = np.abs(middle.values - same).max()
     assert parameters.arithmetic_error(first_step) / 3 <= worst <= parameters.arithmetic_error(first_step)
 
 
 def test_direction_is_exact():
-    # Only rounding turns the middle: by no more than two roundings of 2^-18 a component.
+    # Only rounding turns the middle: by at most two roundings of 2^-18 a component.
     left, right = codes(7, np.random.default_rng(8).uniform(0, 90, 50_000))
     for parameters in VARIANTS:
         if parameters.max_angle == 90:
@@ -95,7 +95,7 @@ def test_equal_normals_stay(degree):
     normals = np.vstack([axes, unit_codes(np.random.default_rng(9), 20_000)])
     middle, u, out_of_range = Bisection(degree).compute(*component_words(normals, normals))
     assert not out_of_range.any()
-    # The length of a code vector is off by rounding, and the unit corrects it where it can.
+    # The length of a code vector is off by rounding, and the unit corrects it if it can.
     assert np.abs(u.codes).max() <= 2
     assert np.abs(middle.codes - normals).max() <= 1
     np.testing.assert_array_equal(middle.codes[:6], axes)
@@ -117,16 +117,16 @@ def test_stiff_angles_within_the_bound(parameters, angle):
 @pytest.mark.parametrize("excess", [-1 / 256, 1 / 256])
 @pytest.mark.parametrize("angle", [0, 1e-4, 1, 20, 44])
 def test_stiff_lengths_of_the_ends(degree, angle, excess):
-    """Ends of length 1 +- 1/256: the bound holds, and the error of the middle's length is halved.
+    """With ends of length 1 +- 1/256 the bound holds, and the middle has half of the length's error.
 
-    u may then be negative, to -2/256, where the fit goes on as smoothly as the function.
+    u may then be negative, down to -2/256, where the fit is as smooth as the function.
     """
     parameters = Bisection(degree)
     left, right = pairs_of_length(np.random.default_rng(12), 4000, angle, 1 + excess)
     middle, _, out_of_range, exact, _ = bisect(parameters, left, right)
     assert not out_of_range.any()
     assert np.abs(middle.values - np.clip(exact, -1, ONE * COMPONENT.step)).max() <= parameters.error(False)
-    # Of (1 + x)^2 cos(psi/2)^2 in place of cos(psi/2)^2 under the root: x / (1 + r) at first order.
+    # The root has (1 + x)^2 cos(psi/2)^2 in place of cos(psi/2)^2: x / (1 + r) at first order.
     inside = np.all(np.abs(middle.codes) < ONE, axis=1)
     length = np.linalg.norm(middle.codes, axis=1)[inside] / ONE
     expected = 1 + excess / (1 + np.cos(np.radians(angle)))
@@ -135,7 +135,10 @@ def test_stiff_lengths_of_the_ends(degree, angle, excess):
 
 
 def test_stiff_normals_of_length_zero():
-    """Such a normal is taken for one at 90 degrees: a unit up to 45 flags it, one up to 90 scales by h(0)."""
+    """A normal of length zero counts as one at 90 degrees.
+
+    A unit for 45 degrees flags it, and a unit for 90 degrees scales it by h(0).
+    """
     left, zero = unit_codes(np.random.default_rng(13), 2000), np.zeros((2000, 3), dtype=np.int64)
     for a, b in ((left, zero), (zero, left), (zero, zero)):
         assert bisect(Bisection(2, 45), a, b)[2].all()
@@ -147,7 +150,8 @@ def test_stiff_normals_of_length_zero():
 
 @pytest.mark.parametrize("parameters", VARIANTS, ids=str)
 def test_stiff_every_code_without_silent_wrap(parameters):
-    """Vectors of the words' ends: flagged, or a middle on the side of the sum, of 0.25 to 0.75 of it."""
+    """Vectors at the ends of the words are flagged, or have a middle on the side of their sum, of 0.25 to
+    0.75 of the sum."""
     left, right = word_corners()
     middle, _, out_of_range = parameters.compute(*component_words(left, right))
     cosine = dot(left, right) / ONE**2
@@ -161,7 +165,7 @@ def test_stiff_every_code_without_silent_wrap(parameters):
 def test_published_degree_two_shortens_a_flat_face():
     axis = Fixed(COMPONENT, np.array([[0, 0, ONE]]))
     middle, _, _ = Bisection(as_published=True).compute(axis, axis)
-    # 0.499 in place of 0.5.
+    # 0.499 is in place of 0.5.
     assert middle.codes[0, 2] / ONE == pytest.approx(0.998, abs=2e-5)
 
 

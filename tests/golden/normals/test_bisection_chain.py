@@ -34,7 +34,7 @@ def compute(chain, left, right, level):
 
 
 def error_of(chain, left, right, level):
-    """Normals and largest error against the closed form; no span is out of range."""
+    """Normals and their largest error against the closed form. No span is out of range."""
     normal, out_of_range = compute(chain, left, right, level)
     assert not out_of_range.any()
     weight_l, weight_m = weights(np.radians(degrees_between(left, right)), level)
@@ -63,7 +63,8 @@ def test_error_under_its_bound(bisection, first_step):
         _, worst = error_of(chain, *ends, level)
         bound = chain.error(level, first_step)
         assert worst <= bound
-        # Further on, the bound's largest error of the fit and its widest angle drift apart.
+        # At higher levels the largest error of the fit and the widest angle of the bound do not belong to the
+        # same span.
         assert level > 3 or worst >= bound / 4
 
 
@@ -90,7 +91,7 @@ def test_stiff_angles_flag(angle):
 
 @pytest.mark.parametrize("angle", [0, 1e-4, 1, 44.9, 45, 45.1, 89.9, 90])
 def test_stiff_angles_within_the_bound(angle):
-    """Every level: no drift along the chain, as each step halves the error that it finds."""
+    """No error grows along the chain at any level, because each step halves the error before it."""
     left, right = code_pairs_at(np.random.default_rng(6), 2000, angle)
     chain = BisectionChain()
     for level in range(1, 16):
@@ -103,11 +104,12 @@ def test_stiff_angles_within_the_bound(angle):
 
 @pytest.mark.parametrize("excess", [-1 / 256, 1 / 256])
 def test_stiff_lengths_of_the_ends(excess):
-    """Ends of length 1 + x, x = +- 1/256: the length of a normal is off by |x| at most.
+    """With ends of length 1 + x, x = +- 1/256, the length of a normal is off by at most |x|.
 
-    Its angle is taken as psi', ``cos psi' = (1 + x)^2 cos psi``, for which ``l^2 + m^2 + 2 l m cos psi'``
-    is 1; so the squared length is ``(1 + x)^2 (1 - 2 l m cos psi (2 x + x^2))``, at first order
-    ``1 + 2 x (1 - 2 l m cos psi)``, and ``l m <= 1 / (2 (1 + cos psi'))`` leaves x/2 to x.
+    The chain takes the angle psi' with ``cos psi' = (1 + x)^2 cos psi``, for which
+    ``l^2 + m^2 + 2 l m cos psi'`` is 1. So the squared length is
+    ``(1 + x)^2 (1 - 2 l m cos psi (2 x + x^2))``, at first order ``1 + 2 x (1 - 2 l m cos psi)``. Because
+    ``l m <= 1 / (2 (1 + cos psi'))``, x/2 to x of the error is left.
     """
     rng, chain = np.random.default_rng(7), BisectionChain()
     ends = pairs_of_length(rng, 4000, rng.uniform(0, 44, 4000), 1 + excess)
@@ -121,7 +123,10 @@ def test_stiff_lengths_of_the_ends(excess):
 
 
 def test_stiff_normals_of_length_zero():
-    """As in one bisection: taken for 90 degrees, flagged by a chain made for 45; zeros stay zero."""
+    """As in a single bisection, the angle counts as 90 degrees, and a chain for 45 degrees flags it.
+
+    Zeros stay zero.
+    """
     left = unit_codes(np.random.default_rng(9), 1000)
     zero, level = np.zeros_like(left), np.arange(1000) % 15 + 1
     for ends in ((left, zero), (zero, left), (zero, zero)):
@@ -134,11 +139,11 @@ def test_stiff_normals_of_length_zero():
 
 @pytest.mark.parametrize("level", [1, 3, 15])
 def test_stiff_every_code_is_accepted(level):
-    """Ends of words, unit vectors or not: no weight leaves its word, as each saturates."""
+    """With any codes, unit vectors or not, each weight saturates and none leaves its word."""
     left, right = word_corners()
     normal, out_of_range = compute(BisectionChain(), left, right, level)
     np.testing.assert_array_equal(out_of_range, dot(left, right) / ONE**2 < -1e-3)
-    # Where nothing is flagged, a normal is a sum of the ends with weights of 0 to 1 each.
+    # If nothing is flagged, a normal is a sum of both ends, with weights of 0 to 1.
     low = np.minimum(left, 0) + np.minimum(right, 0) - 2
     high = np.maximum(left, 0) + np.maximum(right, 0) + 2
     inside = (low <= normal.codes) & (normal.codes <= high)

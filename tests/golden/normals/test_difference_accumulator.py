@@ -42,7 +42,8 @@ def curve_of(left, right, length):
 
 
 def test_stiff_closed_form_equals_the_recurrence_and_its_wraps():
-    """Wrapping included: start, differences over their whole words, added one by one."""
+    """The closed form also wraps as the additions do: any start, and differences over their whole words,
+    added one by one."""
     rng, count, length = np.random.default_rng(1), 200, 500
     start, first, second = (any_codes(rng, format, count, 3) for format in (COMPONENT, FORMAT, FORMAT))
     normals = compute(start, first, second, length).codes.reshape(count, length, 3)
@@ -58,16 +59,17 @@ def test_stiff_closed_form_equals_the_recurrence_and_its_wraps():
 
 
 def test_stiff_drift_of_the_worst_case():
-    """The differences rounded up by the most they can be, and the last rounding up by the most it can.
+    """The differences are rounded up as far as possible, and so is the last rounding.
 
-    ``G dt^2`` and ``P dt`` are each half a unit, 2^-43, short of their code; the second difference is then a
-    whole unit too large, and the first one too. After k pixels that is ``k + k (k - 1)/2`` units, of the
-    docstring's ``k + k^2/2``; with 2^-18 of the last rounding it is under a step, 2^-17, to the last pixel.
+    ``G dt^2`` and ``P dt`` are each half a unit, 2^-43, under their code. The second difference is then a
+    whole unit too large, and so is the first. After k pixels this makes ``k + k (k - 1)/2`` units, of the
+    docstring's ``k + k^2/2``. With 2^-18 of the last rounding it is under a step, 2^-17, up to the last
+    pixel.
     """
     assert STEP > 2.0**-42 * (4094 + 4094**2 / 2) + 2.0**-18
     k, start, second = np.arange(4095), 1000, 2 * 12345
-    # The first difference for which the sum at the last pixel is just at the half that rounds up:
-    # 4094 first + 4094 * 4093 / 2 second = 2^24 modulo 2^25.
+    # The first difference for which the sum at the last pixel is exactly the half that rounds up: 4094 first
+    # + 4094 * 4093 / 2 second = 2^24 modulo 2^25.
     rest = (UNITS // 2 - 2047 * 4093 * second) // 2
     first = rest * pow(2047, -1, UNITS // 2) % (UNITS // 2)
     assert (4094 * first + 2047 * 4093 * second) % UNITS == UNITS // 2
@@ -82,7 +84,10 @@ def test_stiff_drift_of_the_worst_case():
 
 @pytest.mark.parametrize("length", [1, 2, 3, 16, 4095])
 def test_stiff_drift_against_the_curve_with_exact_differences(length):
-    """No worse than one step at any pixel: differences rounded to 42 bits from float64, where t is exact."""
+    """No pixel is off by more than one step.
+
+    The differences are rounded to 42 bits from float64, where t is exact.
+    """
     rng, count = np.random.default_rng(length), 40 if length > 100 else 5000
     start = rng.integers(-60_000, 60_000, (count, 3))
     dt = 1 / max(length - 1, 1)
@@ -94,19 +99,19 @@ def test_stiff_drift_against_the_curve_with_exact_differences(length):
     error = np.abs(normals.values - (start[span] * STEP + p[span] * k * dt + g[span] * (k * dt) ** 2))
     assert (error <= 2.0**-18 + 2.0**-42 * (k + k**2 / 2) + 2.0**-50).all()
     assert error.max() < STEP
-    # A span of one pixel gives its start, exactly.
+    # A span of one pixel gives its start exactly.
     assert error.max() > 0.9 * 2.0**-18 if length > 2 else length > 1 or error.max() == 0
 
 
 @pytest.mark.parametrize("length", [1, 2, 3, 16, 4095])
 @pytest.mark.parametrize("angle", [0, 1e-4, 1, 20, 45])
 def test_stiff_whole_spans(angle, length):
-    """From the unquantised ends: every component within the sum of the units' bounds.
+    """Against curves of the unquantised ends, every component is within the sum of the units' bounds.
 
-    An end is off by under a step a component, and so by ``1 / (2 cos(psi/2))`` of both, under 1.09 steps with
-    the change of h, the exact middle of the quantised ends; the three weights of a quadratic through t = 0,
-    1/2, 1 add up to at most 1.25 in magnitude. The middle adds `MiddleNormal.ERROR`, with a weight of at most
-    1, the setup the bound in its docstring, the accumulator 2^-18.
+    An end is off by less than a step a component, and the middle by ``1 / (2 cos(psi/2))`` of both ends. With
+    the change of h this is under 1.09 steps. The three weights of a quadratic through t = 0, 1/2, 1 add up to
+    at most 1.25 in magnitude. The middle adds `MiddleNormal.ERROR`, with a weight of at most 1, the setup the
+    bound in its docstring, the accumulator 2^-18.
     """
     count = max(20, 30_000 // length)
     ends = pairs_at(np.random.default_rng(length), count, angle)
@@ -122,7 +127,7 @@ def test_stiff_whole_spans(angle, length):
     bound += 2.0**-42 * (length + length**2 / 2) + 2.0**-18
     error = np.abs(normals.values - curve_of(*ends, length))
     assert bound / 20 < error.max() <= bound
-    # The ends themselves: the first exactly; the last but for dt, where a flat span has no dt to feel.
+    # The first end is exact. The last end is off by the error of dt, which a flat span does not have.
     codes = normals.codes.reshape(count, length, 3)
     np.testing.assert_array_equal(codes[:, 0], left)
     if length > 1:
@@ -132,7 +137,7 @@ def test_stiff_whole_spans(angle, length):
 
 
 def test_lengths_of_the_normals():
-    """At 20 degrees the curve itself is 2.9e-5 short at most, as published; quantisation adds under 1e-5."""
+    """At 20 degrees the curve is at most 2.9e-5 too short, as published. Quantisation adds less than 1e-5."""
     ends = pairs_at(np.random.default_rng(9), 5000, 20.0)
     normals, *_ = whole_spans(*(quantise(end) for end in ends), 33)
     curve, ours = (
@@ -154,9 +159,10 @@ def test_stiff_spans_out_of_range_are_flagged_and_stay_in_their_words(angle):
 @pytest.mark.parametrize("scale", [0, 1 - 1 / 256, 1 + 1 / 256])
 @pytest.mark.parametrize("length", [2, 3, 16, 4095])
 def test_stiff_lengths_of_the_ends(length, scale):
-    """Ends of another length, or none: every pixel on the quadratic through the three points, within bounds.
+    """With ends of another length, or of none, every pixel is within the bounds of the quadratic through the
+    three points.
 
-    The setup adds the bound in its docstring, the accumulator 2^-18; a curve longer than 1 saturates.
+    The setup adds the bound in its docstring, the accumulator 2^-18. A curve longer than 1 saturates.
     """
     rng, count = np.random.default_rng(11), max(20, 20_000 // length)
     left, right = pairs_of_length(rng, count, rng.uniform(0, 44, count), scale)

@@ -12,7 +12,7 @@ UNIT, PUBLISHED = DifferenceSetup(), DifferenceSetup(as_published=True)
 LENGTHS = np.arange(1, 4096)
 STEP = 2.0**-17
 SQUARE = 2.0**-16 + 2.0**-17 + 2.0**-34
-"""Relative error of dt^2 and of a product with it."""
+"""Relative error of dt^2, and of a product with dt^2."""
 
 
 def compute(g, p, length, unit=UNIT):
@@ -20,7 +20,7 @@ def compute(g, p, length, unit=UNIT):
 
 
 def coefficients(rng, count, share=1.0):
-    """Codes of G and P, up to a share of their words."""
+    """Codes of G and P, up to a share of the range of their words."""
     return tuple(
         np.trunc(rng.uniform(-share, share, (count, 3)) * format.max_code).astype(np.int64)
         for format in (GPQ.G_FORMAT, GPQ.P_FORMAT)
@@ -28,12 +28,13 @@ def coefficients(rng, count, share=1.0):
 
 
 def walk(first, second, k):
-    """Sum of the differences to pixel k."""
+    """Sum of the differences up to pixel k."""
     return k * first.values + k * (k - 1) / 2 * second.values
 
 
 def test_stiff_every_length_to_its_last_pixel():
-    """The end of the curve with the largest coefficients of both signs: errors as the docstring states."""
+    """At the end of the curve, the largest coefficients of both signs have the errors that the docstring
+    states."""
     rng, worst, last = np.random.default_rng(1), 0, LENGTHS - 1
     for _ in range(4):
         g, p = coefficients(rng, len(LENGTHS))
@@ -46,7 +47,7 @@ def test_stiff_every_length_to_its_last_pixel():
             bound = STEP * np.abs(p * STEP) * t + SQUARE * np.abs(g * STEP) * t**2
             bound += 2.0**-42 * (k + k**2 / 2)
             error = np.abs(walk(first, second, k) - (p * t + g * t**2) * STEP)
-            # Float64 itself, of numbers under 2.
+            # The rounding of float64 itself, for numbers under 2.
             assert (error <= bound + 2.0**-50).all()
             worst = max(worst, (error / np.maximum(bound, 2.0**-42)).max())
     assert worst > 0.5
@@ -54,7 +55,10 @@ def test_stiff_every_length_to_its_last_pixel():
 
 @pytest.mark.parametrize("length", [1, 2, 3, 16, 4095])
 def test_stiff_lengths(length):
-    """Powers of two (dt = 1 and 1/2 here) have exact differences; others the bound above."""
+    """Lengths for which dt is a power of two (here 1 and 1/2) have exact differences.
+
+    Other lengths keep the bound above.
+    """
     g, p = coefficients(np.random.default_rng(length), 1000)
     first, second = compute(g, p, np.full(1000, length))
     dt = 1 / max(length - 1, 1)
@@ -73,7 +77,8 @@ def test_stiff_lengths(length):
 def test_powers_of_two_are_exact(step):
     g, p = coefficients(np.random.default_rng(2), 500)
     first, second = compute(g, p, np.full(500, step + 1))
-    # Products have 17 fraction bits; 42 hold them to steps of 2^12 where the square's shift is up to 24.
+    # Products have 17 fraction bits. If the square's shift is up to 24, 42 bits hold the products in steps of
+    # 2^12.
     g_term = np.floor(g * 2.0**25 / step**2 + 0.5)
     np.testing.assert_array_equal(second.codes, 2 * g_term)
     np.testing.assert_array_equal(first.codes, g_term + np.floor(p * 2.0**25 / step + 0.5))
@@ -82,9 +87,11 @@ def test_powers_of_two_are_exact(step):
 @pytest.mark.parametrize("angle", [0, 1e-4, 1, 45, 89.9, 90, 120, 180])
 @pytest.mark.parametrize("length", [1, 2, 3, 16, 4095])
 def test_stiff_angles(angle, length):
-    """Of real spans: the end of the curve within its bound; wider spans saturate before, so it holds there.
+    """In real spans the end of the curve is within its bound.
 
-    With equal ends both differences are 0 to the bit, for every length.
+    Wider spans saturate earlier, so the bound holds there, too.
+
+    With equal ends both differences are exactly 0 for every length.
     """
     ends = component_words(*code_pairs_at(np.random.default_rng(6), 2000, angle))
     g, p, _ = curves_of(*ends)
@@ -103,9 +110,9 @@ def test_zero_coefficients_stay_zero():
 
 
 def test_published_order():
-    """``(G dt + P) dt`` and ``2 (G dt) dt``: the end of the curve within its bound.
+    """With ``(G dt + P) dt`` and ``2 (G dt) dt`` the end of the curve is within its bound.
 
-    For coefficients up to half of their words, where ``G dt + P`` does not saturate; every length.
+    Coefficients are up to half of their words, so that ``G dt + P`` does not saturate. Every length is tried.
     """
     rng, worst = np.random.default_rng(7), 0
     k = np.maximum(LENGTHS - 1, 1)[:, np.newaxis]
@@ -121,13 +128,13 @@ def test_published_order():
 
 @pytest.mark.parametrize("length", [1, 2, 3, 16, 4095])
 def test_published_order_saturates(length):
-    """Slopes past the end of ``SQ(1, 17)``, at the ends of the words: clipped, never wrapped."""
+    """Slopes past the end of ``SQ(1, 17)``, at the ends of the words, are clipped and never wrap."""
     ends = np.meshgrid([GPQ.G_FORMAT.min_code, 0, GPQ.G_FORMAT.max_code], [-(2**17), 0, 2**17 - 1])
     g, p = (np.repeat(column.reshape(-1, 1), 3, axis=1) for column in ends)
     first, second = compute(g, p, np.full(len(g), length), PUBLISHED)
     dt = 1 / max(length - 1, 1)
     slope = np.clip((g * dt + p) * STEP, -1, 1 - STEP)
-    # dt and its rounded products: relative 2^-17 each, and half a step of the slope.
+    # dt and its rounded products have relative errors of 2^-17 each, and the slope half a step.
     assert (np.abs(first.values - slope * dt) <= dt * (2.0**-16 + 2.0**-18) + 2.0**-42).all()
     bound = dt**2 * (2.0**-15 + STEP) + 2.0**-41
     assert (np.abs(second.values - 2 * g * STEP * dt**2) <= bound).all()

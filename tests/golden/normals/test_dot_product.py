@@ -10,7 +10,7 @@ from blysk.golden.number.unit_vector import COMPONENT
 
 
 def exact(a, b):
-    """Python integers."""
+    """The dot product in Python integers."""
     return (a.astype(object) * b.astype(object)).sum(axis=-1)
 
 

@@ -1,4 +1,4 @@
-"""G/P/Q unit: the bit-accurate model is exact; the ranges that its words were made for."""
+"""G/P/Q unit: the bit-accurate model is exact, and its words have the stated ranges."""
 
 import numpy as np
 import pytest
@@ -20,7 +20,7 @@ def compute(left, middle, right):
 
 
 def assert_through_three_points(ends):
-    """In integers: N(0) = Q, 4 N(1/2) = G + 2 P + 4 Q, N(1) = G + P + Q."""
+    """Check in integers: N(0) = Q, 4 N(1/2) = G + 2 P + 4 Q, N(1) = G + P + Q."""
     left, right = ends
     middle = middle_of(*ends)
     g, p, q = (coefficient.codes for coefficient in compute(left, middle, right))
@@ -36,13 +36,13 @@ def test_curve_passes_through_the_three_normals_exactly():
 
 @pytest.mark.parametrize("length", [0, 1 - 1 / 256, 1 + 1 / 256])
 def test_stiff_lengths_of_the_ends(length):
-    """The curve passes through its three points whatever their lengths: it is linear in them."""
+    """The curve passes through its three points whatever their lengths, because it is linear in them."""
     rng = np.random.default_rng(5)
     assert_through_three_points(pairs_of_length(rng, 20_000, rng.uniform(0, 44, 20_000), length))
 
 
 def test_ranges_up_to_45_degrees():
-    """|G| = 4 (1 - cos(psi/2)) and |P| at its largest, each along a component; never saturated."""
+    """|G| = 4 (1 - cos(psi/2)) and |P| are at their largest, each along a component. Neither saturates."""
     psi = np.radians(45)
     half = np.array([np.cos(psi / 2), np.sin(psi / 2)])
     largest_g = 4 * (1 - np.cos(psi / 2))
@@ -51,7 +51,7 @@ def test_ranges_up_to_45_degrees():
     assert largest_p == pytest.approx(0.83, abs=1e-2)
     left, right = code_pairs_at(np.random.default_rng(2), 100_000, 45.0)
     g, p, _ = compute(left, middle_of(left, right), right)
-    # 4 N_c with its error, and half a step more for the length of each end.
+    # The error of 4 N_c is added, and half a step for the length of each end.
     slack = 4 * MiddleNormal.ERROR + 5 * 2.0**-17
     assert 0.99 * largest_g < np.abs(g.values).max() < largest_g + slack
     assert 0.99 * largest_p < np.abs(p.values).max() < largest_p + slack
@@ -63,7 +63,7 @@ def whole(left, middle, right):
 
 
 def test_stiff_every_code_saturates_and_never_wraps():
-    """Every end of every word, against integers clipped to the format."""
+    """Every combination of ends of the words is compared with integers that are clipped to the format."""
     ends = [COMPONENT.min_code, -ONE, 0, ONE]
     middles = [MiddleNormal.FORMAT.min_code, 0, MiddleNormal.FORMAT.max_code]
     grid = np.stack(np.meshgrid(ends, middles, ends), axis=-1).reshape(-1, 3)
@@ -77,13 +77,16 @@ def test_stiff_every_code_saturates_and_never_wraps():
 
 @pytest.mark.parametrize("angle", [0, 1e-4, 1, 45, 89.9, 90, 90.01, 120, 180])
 def test_stiff_angles(angle):
-    """Exact up to 45 degrees; a wider span, whose middle is flagged and saturated, gives clipped integers."""
+    """Up to 45 degrees the unit is exact.
+
+    A wider span, whose middle is flagged and saturated, gives clipped integers.
+    """
     left, right = code_pairs_at(np.random.default_rng(4), 20_000, angle)
     middle = middle_of(left, right)
     g, p, q = (coefficient.codes for coefficient in compute(left, middle, right))
     whole_g, whole_p = whole(left, middle, right)
     if angle > 45:
-        # No span gets that far up to 45 degrees; at 180 most do.
+        # Up to 45 degrees no span saturates; at 180 degrees most do.
         assert angle < 180 or (p != whole_p).any(axis=1).mean() > 0.5
         whole_g, whole_p = np.clip(whole_g, -(2**16), 2**16 - 1), np.clip(whole_p, -(2**17), 2**17 - 1)
     np.testing.assert_array_equal(g, whole_g)

@@ -14,7 +14,7 @@ UNIT = LineSetup()
 MAX_LENGTH = (1 << LENGTH_BITS) - 1
 FORMAT = UNIT.VECTOR_FORMAT
 BOUND = UNIT.ERROR / np.sqrt(3)
-"""Of each component."""
+"""Bound of each component."""
 
 
 def steps(left, right, length):
@@ -23,17 +23,18 @@ def steps(left, right, length):
 
 
 def errors(left, right, length, pixel):
-    """Distance of a point of the line from the exact one, by component, in units of 1."""
+    """Distance of a point of the line from the exact point, by component, in units of 1."""
     step = steps(left, right, length)
     assert step.format == UNIT.FORMAT
     t = pixel / np.maximum(length - 1, 1)
-    # Exact: differences of 24 bits, products of 53.
+    # This is exact: differences have 24 bits, products 53.
     moved = pixel[:, np.newaxis] * step.codes * UNIT.FORMAT.step
     return np.abs(moved - (right - left) * t[:, np.newaxis] * FORMAT.step)
 
 
 def test_every_length():
-    """The last pixel of a span of each length, of lines as long as the words allow and of others."""
+    """The last pixel of a span of each length is checked, for lines as long as the words allow and for
+    others."""
     rng = np.random.default_rng(1)
     length = np.arange(1, MAX_LENGTH + 1)
     full = np.full((len(length), 3), FORMAT.max_code) * rng.choice([-1, 1], (len(length), 3))
@@ -45,7 +46,7 @@ def test_every_length():
 
 @pytest.mark.parametrize("length", [2, 3, 4, 5, 16, 17, 2049, 2050, 4094, 4095])
 def test_stiff_lengths(length):
-    """Every pixel of spans at the ends of the table of reciprocals."""
+    """Every pixel is checked for spans at the ends of the table of reciprocals."""
     rng = np.random.default_rng(length)
     count = 60_000 // length + 20
     left, right = any_lines(rng, count)
@@ -59,7 +60,7 @@ def test_stiff_lengths(length):
 
 
 def test_span_of_one_pixel():
-    """It counts as two: a finite step, that no pixel takes."""
+    """A span of one pixel counts as two pixels: its step is finite, and no pixel takes it."""
     left, right = any_lines(np.random.default_rng(2), 100)
     np.testing.assert_array_equal(
         steps(left, right, np.ones(100, int)).codes, steps(left, right, np.full(100, 2)).codes
@@ -73,7 +74,10 @@ def test_equal_ends():
 
 
 def test_words_of_the_ends():
-    """The largest differences, both signs, at each length: no step wraps, and the last point is the end's."""
+    """The largest differences of both signs are tried at each length.
+
+    No step wraps, and the last point is that of the end.
+    """
     low, high = FORMAT.min_code, FORMAT.max_code
     length = np.arange(1, MAX_LENGTH + 1)
     for left, right in ((low, high), (high, low)):
@@ -85,7 +89,7 @@ def test_words_of_the_ends():
 
 
 def test_quantised_lines():
-    """The larger end has length 1, the other its proportion, half a code off at most."""
+    """The larger end has length 1, and the other its proportion. Codes are off by at most half a step."""
     rng = np.random.default_rng(4)
     exact = [sphere(rng, 1000) * 10.0 ** rng.uniform(-3, 3, (1000, 1)) for _ in range(2)]
     exact[0][:10] = 0

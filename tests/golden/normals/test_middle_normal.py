@@ -35,7 +35,7 @@ def largest(left, right, unit=UNIT):
 
 
 def test_error_at_every_angle():
-    """Exhaustive in the cosine: one end on an axis, its component of the other at every code."""
+    """Exhaustion of the cosine: one end is on an axis, and the other end has every code along this axis."""
     cosine = np.arange(int(ONE * np.cos(np.radians(MAX_SPAN_ANGLE))) + 1, ONE + 1)
     sine = np.sqrt(1 - (cosine / ONE) ** 2)
     worst = 0
@@ -50,23 +50,23 @@ def test_error_at_every_angle():
 
 @pytest.mark.parametrize("angle", [0, 1e-4, 1, 20, 45, None])
 def test_stiff_angles_within_the_bound(angle):
-    """Measured: 0.35 of the bound up to 20 degrees, 0.80 at 45."""
+    """Measured: 0.35 of the bound up to 20 degrees, 0.80 at 45 degrees."""
     rng = np.random.default_rng(1)
     angles = rng.uniform(0, 45, 50_000) if angle is None else angle
     left, right = code_pairs_at(rng, 50_000, angles)
     worst = largest(left, right)
     assert MiddleNormal.ERROR / 20 < worst <= MiddleNormal.ERROR
-    # Half of the span's angle, to the direction that the error of a vector can turn.
+    # Half of the span's angle, relative to the direction in which the error of a vector turns it.
     middle = compute(left, right)[0].values
     sine = np.linalg.norm(np.cross(normalise(middle), normalise(left.astype(float))), axis=1)
     half = np.radians(angles) / 2
-    # Each end's code is off by a step a component, sqrt(3) steps, and half of it reaches the middle.
+    # Each end's code is off by a step a component, sqrt(3) steps, and half of this reaches the middle.
     turn = np.sqrt(3) * (MiddleNormal.ERROR + 3 * 2.0**-17)
     np.testing.assert_allclose(np.arcsin(sine), half * np.ones_like(sine), rtol=0, atol=turn)
 
 
 def test_equal_ends_give_that_normal_exactly():
-    """A flat face keeps its normal, also near the axes, where codes are up to half a step short."""
+    """A flat face keeps its normal, also near the axes, where codes are up to half a step too short."""
     everywhere = unit_codes(np.random.default_rng(2), 100_000)
     side = np.arange(-300, 301) / ONE
     near = np.stack(np.meshgrid(side, side), axis=-1).reshape(-1, 2)
@@ -88,7 +88,10 @@ def test_order_of_the_ends_does_not_matter():
 
 @pytest.mark.parametrize("angle", [45.0, 45.01, 60, 89.9, 90, 180, None])
 def test_stiff_angles_beyond_are_flagged(angle):
-    """Every span over 45.01 degrees, to opposite normals; none up to 45, quantisation or not."""
+    """Every span over 45.01 degrees is flagged, up to opposite normals.
+
+    No span up to 45 degrees is flagged, with or without quantisation.
+    """
     rng = np.random.default_rng(4)
     angles = rng.uniform(45.01, 180, 50_000) if angle is None else angle
     middle, out_of_range = compute(*code_pairs_at(rng, 50_000, angles))
@@ -97,7 +100,7 @@ def test_stiff_angles_beyond_are_flagged(angle):
 
 
 def test_coefficients():
-    """The fit's share of the error is 8.3e-7, and each word keeps its place: no sum wraps to 60 degrees."""
+    """The fit's share of the error is 8.3e-7. The words are wide enough: no sum wraps up to 60 degrees."""
     c1, c2, c3 = UNIT.coefficients.values
     u = np.linspace(0, ONE_VALUE * (1 - np.cos(np.radians(45))), 100_001)
     error = np.abs(0.5 + u * (c1 + u * (c2 + u * c3)) - half_angle_factor(u / ONE_VALUE))
@@ -105,12 +108,12 @@ def test_coefficients():
     assert error[0] == 0
     assert 0.25 > c1 + 0.5 * (c2 + 0.5 * c3) > c1 > c2 > c3 > 0
     assert u[-1] * (c1 + u[-1] * (c2 + u[-1] * c3)) < 0.0412
-    # The fit comes from a solver of another library: a release that finds other words must be noticed.
+    # The fit comes from a solver of another library. This notices a release that finds other words.
     assert UNIT.coefficients.codes.tolist() == [65565, 24018, 13317]
 
 
 def test_stiff_every_code_is_accepted():
-    """Vectors that are no unit vectors give some number of the format, and a flag when far apart."""
+    """Vectors that are no unit vectors give some number of the format, and a flag if they are far apart."""
     left, right = word_corners()
     middle, out_of_range = compute(left, right)
     assert UNIT.FORMAT.min_code <= middle.codes.min() <= middle.codes.max() <= UNIT.FORMAT.max_code
@@ -120,10 +123,10 @@ def test_stiff_every_code_is_accepted():
 @pytest.mark.parametrize("excess", [-1 / 256, 1 / 256])
 @pytest.mark.parametrize("angle", [0, 1e-4, 1, 20, 44])
 def test_stiff_lengths_of_the_ends(angle, excess):
-    """Ends of length 1 +- 1/256: no flag, and the middle no further off than they are.
+    """Ends of length 1 +- 1/256 are not flagged, and the middle is not further off than the ends.
 
-    The exact function halves an error of the length. Where both ends are so long that u would be negative it
-    is 0, and the middle is the half sum: as long as the ends at angle 0, shorter at any other.
+    The exact function halves an error of the length. If both ends are so long that u would be negative, u is
+    0. The middle is then the half sum: as long as the ends at angle 0, and shorter at any other angle.
     """
     left, right = pairs_of_length(np.random.default_rng(5), 20_000, angle, 1 + excess)
     middle, out_of_range = compute(left, right)
@@ -139,7 +142,7 @@ def test_stiff_lengths_of_the_ends(angle, excess):
 
 
 def test_stiff_normals_of_length_zero():
-    """Such an end has no angle: its dot product is 0, as at 90 degrees, and the span is flagged."""
+    """An end of length zero has no angle: its dot product is 0, as at 90 degrees, and the span is flagged."""
     left = unit_codes(np.random.default_rng(6), 1000)
     zero = np.zeros_like(left)
     for ends in ((left, zero), (zero, left), (zero, zero)):
@@ -169,7 +172,7 @@ def test_model_error_of_every_fit(fit, error, relative):
 
 
 def test_published_polynomials():
-    """The unit's words are the polynomials that `tests/golden/number/test_polynomials.py` holds, in u."""
+    """The unit's words are the polynomials that `tests/golden/number/test_polynomials.py` checks, in u."""
 
     def h(r):
         return half_angle_factor(1 - r)
@@ -183,7 +186,7 @@ def test_published_polynomials():
         unit = MiddleNormal(fit)
         words = np.r_[0.5 + unit.constant.values, unit.coefficients.values] * ONE_VALUE ** np.arange(4)
         ours = np.polynomial.polynomial.polyval(1 - r, words)
-        # Each coefficient is rounded to half a step; the linear programme finds each to 2e-7.
+        # Each coefficient is rounded to half a step. The linear programme finds each to 2e-7.
         assert np.abs(ours - np.polynomial.polynomial.polyval(r, coefficients)).max() < 4 * 2.0**-20 + 1e-6
 
 
@@ -192,7 +195,7 @@ def test_error_of_every_fit(fit):
     unit, rng = MiddleNormal(fit), np.random.default_rng(7)
     angles = np.r_[rng.uniform(0, 45, 50_000), np.zeros(5_000), np.full(5_000, 45)]
     left, right = code_pairs_at(rng, len(angles), angles)
-    # Along an axis a component of the sum is as large as it gets.
+    # Along an axis a component of the sum is as large as possible.
     left[:100, :] = right[:100, :] = [0, -ONE, 0]
     assert unit.error / 3 < largest(left, right, unit) <= unit.error
     assert fit != "exact" or unit.error <= MiddleNormal.ERROR
@@ -202,7 +205,7 @@ def test_error_of_every_fit(fit):
     ("fit", "change"), [("exact", 0), ("as_published", 0), ("minimax_2", 3.83e-3), ("minimax_3", -5.76e-4)]
 )
 def test_flat_faces_feel_the_plain_fit(fit, change):
-    """The default and the published polynomial keep a normal; the plain cubic makes it 0.06 % short."""
+    """The default and the published polynomial keep a normal. The plain cubic makes it 0.06 % too short."""
     normals = unit_codes(np.random.default_rng(8), 20_000)
     middle, _ = compute(normals, normals, MiddleNormal(fit))
     if not change:

@@ -15,13 +15,13 @@ from blysk.golden.reference.curves import interpolate
 STEP = COMPONENT.step
 LENGTHS = np.array([1, 2, 3, 16, 4095])
 SATURATED = 2.0**-18 * (2 * 2 + 1 + 1 + 2)
-"""Bound where words saturate: the slope reaches 2, and a saturated inner sum is a step short of 1."""
+"""Bound if words saturate: the slope reaches 2, and a saturated inner sum is a step less than 1."""
 
 forms = pytest.mark.parametrize("form", QUADRATIC_FORMS)
 
 
 def curves(seed, angles):
-    """Unit normals of spans, their words, and G, P, Q; all are in range or none."""
+    """Unit normals of spans, their words, and G, P, Q. All spans are in range, or none."""
     ends = pairs_at(np.random.default_rng(seed), len(angles), angles)
     words = component_words(*(quantise(end) for end in ends))
     out_of_range = MiddleNormal().compute(*words)[1]
@@ -30,7 +30,7 @@ def curves(seed, angles):
 
 
 def exact(coefficients, length, form="direct"):
-    """The polynomial at every pixel; of a horner form as its inner sum saturates."""
+    """The polynomial at every pixel. For a horner form its inner sum saturates."""
     span, index = pixels_of(length)
     g, p, q = (word.values[span] for word in coefficients)
     t = (index / np.maximum(length[span] - 1, 1))[:, np.newaxis]
@@ -52,7 +52,7 @@ def test_stiff_parameter_of_every_pixel_of_every_length():
     for lengths in np.array_split(np.arange(2, 4096), 40):
         span, index = pixels_of(lengths)
         t = -evaluator.parameter(evaluator.step(lengths)[span], index).values
-        # Table and rounding, 2^-18 each; the first is in proportion to t.
+        # Table and rounding add 2^-18 each; the error of the table is in proportion to t.
         exact_t = index / (lengths[span] - 1)
         assert np.all(np.abs(t - exact_t) <= 2.0**-18 * (1 + exact_t))
         assert np.all(t[index == 0] == 0)
@@ -65,7 +65,7 @@ def test_error_to_45_degrees(form):
     angles = np.r_[0, 1e-4, 1, rng.uniform(0, 45, 400), np.full(400, 45.0)]
     length = np.r_[16, 16, 16, np.full(10, 4095), rng.integers(1, 800, len(angles) - 13)]
     *_, coefficients = curves(4, angles)
-    # A bound more than twice the worst seen would say little.
+    # A bound of more than twice the worst error would say little.
     bound = QuadraticEvaluator(form).error
     assert bound / 2 < error_of(form, coefficients, length) <= bound
 
@@ -73,7 +73,7 @@ def test_error_to_45_degrees(form):
 @forms
 @pytest.mark.parametrize("degrees", [0, 1e-4, 1, 45])
 def test_stiff_angles_and_lengths_in_range(form, degrees):
-    """The bound holds at every one, and the ends are the span's own, to the code."""
+    """The bound holds at every pixel, and the ends are exactly the span's own."""
     length = np.tile(LENGTHS, 20)
     *_, left, right, coefficients = curves(14, np.full(len(length), degrees))
     assert error_of(form, coefficients, length) <= QuadraticEvaluator(form).error
@@ -88,10 +88,10 @@ def test_stiff_angles_and_lengths_in_range(form, degrees):
 @forms
 @pytest.mark.parametrize("degrees", [45.01, 60, 89.9, 90, 90.01, 135, 179.9, 180])
 def test_stiff_spans_out_of_range_stay_on_their_polynomial(form, degrees):
-    """Flagged by the middle normal; the result is the polynomial of G and P as they saturated.
+    """The middle normal flags these spans. The result is the polynomial of the saturated G and P.
 
-    Each of t, t^2 or the inner sum, and the result, is rounded as ever; the slope is under 3 (|P| is at most
-    1 and 2 |G| too) and the inner sum saturates, a step short of 1. The curve starts in its left normal.
+    t, t^2 or the inner sum, and the result, are rounded as usual. The slope is under 3, because |P| and 2 |G|
+    are at most 1. The inner sum saturates a step short of 1. The curve starts in its left normal.
     """
     length = np.tile(LENGTHS, 20)
     *_, left, _, coefficients = curves(15, np.full(len(length), degrees))
@@ -102,7 +102,8 @@ def test_stiff_spans_out_of_range_stay_on_their_polynomial(form, degrees):
 
 @pytest.mark.parametrize(("degrees", "off"), [(46, 2.3e-5), (60, 0.1), (90, 0.48), (120, 0.78), (180, 1.05)])
 def test_stiff_error_of_a_span_out_of_range(degrees, off):
-    """The docstring's figures: P saturates from 53 degrees on, G from 57, and the curve misses its end."""
+    """These are the docstring's figures: P saturates from 53 degrees on, G from 57, and the curve misses its
+    end."""
     left, right, *_, coefficients = curves(17, np.full(20_000, degrees))
     length = np.full(20_000, 5)
     span, index = pixels_of(length)
@@ -114,9 +115,10 @@ def test_stiff_error_of_a_span_out_of_range(degrees, off):
 @forms
 @pytest.mark.parametrize("size", [1 - 1 / 256, 1 + 1 / 256, 1 / 256, 0])
 def test_stiff_normals_that_are_not_of_unit_length(form, size):
-    """G, P and Q of a longer curve of 44 degrees are no larger than those of a unit one of 45: same bound."""
+    """G, P and Q of a longer curve of 44 degrees are no larger than those of a unit curve of 45 degrees, so
+    the bound is the same."""
     ends = pairs_at(np.random.default_rng(16), 50, 44.0)
-    # Longer components than a word's are cut to it.
+    # Components longer than a word are cut to it.
     codes = (np.clip(np.rint(size * quantise(n)), -(2**17), 2**17 - 1).astype(int) for n in ends)
     left, right = component_words(*codes)
     middle = (left.values + right.values) / (2 * np.cos(np.radians(22)))
@@ -128,7 +130,7 @@ def test_stiff_normals_that_are_not_of_unit_length(form, size):
 
 @forms
 def test_spans_start_and_end_in_their_normals(form):
-    """Of every length."""
+    """Spans of every length start and end in their normals."""
     length, spans = np.arange(1, 4096), np.arange(4095)
     *_, left, right, coefficients = curves(5, np.linspace(0, 45, len(length)))
     first, last = (
@@ -149,8 +151,8 @@ def test_published_distance_from_the_great_circle(form, degrees, published):
     circle = (np.sin((1 - t) * angle) * left[span] + np.sin(t * angle) * right[span]) / np.sin(angle)
     normals = evaluate(form, coefficients, length).values / (1 - STEP)
     distance = np.linalg.norm(normals - circle, axis=1).max()
-    # On top of the model: the evaluator, the middle normal, and the rounding of the end normals, each of
-    # three components; and half of the last digit shown.
+    # On top of the model's error come the evaluator, the middle normal, and the rounding of the end normals,
+    # for each of three components. Half of the last digit shown is added.
     arithmetic = np.sqrt(3) * (QuadraticEvaluator(form).error + MiddleNormal.ERROR + 2 * STEP)
     half_digit = 0.05 * 10.0 ** np.floor(np.log10(published))
     assert distance == pytest.approx(published, abs=arithmetic + half_digit)

@@ -14,7 +14,7 @@ SHORTEST_CODE = 1 << 14
 
 
 def checked(vectors):
-    """Codes and flags; the largest angle and error of the length of those that are not flagged."""
+    """Codes and flags, and the largest angle and length error of the vectors that are not flagged."""
     normals, too_short = UNIT.compute(Fixed(FORMAT, vectors))
     assert normals.format == COMPONENT
     found, exact = normals.codes[~too_short] / ONE, vectors[~too_short] * FORMAT.step
@@ -27,14 +27,17 @@ def checked(vectors):
 
 
 def vectors_of(rng, count, shortest):
-    """Codes of vectors of lengths from the shortest to 1, by their logarithm, anywhere on the sphere."""
+    """Codes of vectors of all directions.
+
+    The logarithm of their lengths is uniform, from the shortest to 1.
+    """
     vectors = sphere(rng, count) * shortest ** rng.random((count, 1))
     return np.rint(vectors * FORMAT.max_code).astype(np.int64)
 
 
 @pytest.mark.parametrize("octave", range(4))
 def test_factor_of_every_squared_length(octave):
-    """Every word of a segment and x, with the lowest and the highest of the bits that are cut."""
+    """Every word of a segment and x is tried, with the lowest and the highest of the bits that are cut."""
     bits = np.arange(1 << 21, 1 << 22)
     codes = bits[bits < 3 << 20] << (11 + octave) if octave == 3 else bits << (11 + octave)
     bound = UNIT.FIT + 2.0**-21 + 2.0**-17 / 16 + 2.0**-17
@@ -47,14 +50,14 @@ def test_factor_of_every_squared_length(octave):
 
 
 def test_fit_alone():
-    """Each segment in float64, near the best that a quadratic can do."""
+    """In float64 each segment is near the best quadratic."""
     c0, c1, c2 = (c.values[:, np.newaxis] for c in UNIT.coefficients)
     u = np.linspace(0, 1 / 16, 2001)
     octave, segment = np.divmod(np.arange(64), 16)
     scale = 2.0 ** (octave - 2)[:, np.newaxis]
     square = (1 + segment[:, np.newaxis] / 16 + u) * scale
     error = np.abs(c0 - u * (c1 - u * c2) - ONE * COMPONENT.step / np.sqrt(square))
-    # A quadratic over a width w is off by w^3/192 |f'''| at best; rounding c0 adds up to half its step.
+    # A quadratic over a width w is off by at least w^3/192 |f'''|. Rounding c0 adds up to half its step.
     third = 15 / 8 * ((1 + (segment + 0.5) / 16) ** -3.5) / np.sqrt(scale[:, 0])
     best = (1 / 16) ** 3 / 192 * third
     assert best.max() < error.max() <= UNIT.FIT
@@ -63,7 +66,7 @@ def test_fit_alone():
 
 @pytest.mark.parametrize("rounds", [1, pytest.param(100, marks=pytest.mark.long)])
 def test_random_vectors(rounds):
-    """Lengths 2^-8 to 1: only vectors at the very end of the range have no component of 2^-8."""
+    """Lengths are 2^-8 to 1. Only vectors at the very end of the range have no component of 2^-8."""
     rng = np.random.default_rng(rounds)
     for _ in range(rounds):
         vectors = vectors_of(rng, 200_000, UNIT.SHORTEST)
@@ -77,13 +80,14 @@ def test_random_vectors(rounds):
 
 
 def flagged(vectors):
-    """Components from -2^-8 to under 2^-8, all three."""
+    """Whether all three components are from -2^-8 to under 2^-8."""
     return ((vectors >= -SHORTEST_CODE) & (vectors < SHORTEST_CODE)).all(axis=1)
 
 
 @pytest.mark.parametrize("power", range(14, 23))
 def test_stiff_largest_component_about_a_power_of_two(power):
-    """Where the shift changes, and where the flag does: a code before, at and after, of either sign."""
+    """Where the shift and the flag change, a code before, at and after the change is tried, with both
+    signs."""
     rng = np.random.default_rng(power)
     largest = (1 << power) + np.array([-2, -1, 0, 1, 2])
     largest = np.r_[largest, -largest]
@@ -97,7 +101,7 @@ def test_stiff_largest_component_about_a_power_of_two(power):
 
 
 def test_stiff_lengths_do_not_matter():
-    """A vector and its doubles, to the end of the word, have one unit vector, bit by bit."""
+    """A vector and its doubles, up to the end of the word, have the same unit vector, bit by bit."""
     rng = np.random.default_rng(5)
     vectors = np.rint(sphere(rng, 5000) * rng.uniform(2.0**15, 2.0**16, (5000, 1))).astype(np.int64)
     expected, too_short, _, _ = checked(vectors)
@@ -109,7 +113,7 @@ def test_stiff_lengths_do_not_matter():
 
 
 def test_stiff_unit_vectors_stay():
-    """Unit vectors at full length, and the axes: within a step of their own components."""
+    """Unit vectors of full length, and the axes, stay within a step of their own components."""
     axes = np.vstack([np.eye(3), -np.eye(3)])
     vectors = np.vstack([sphere(np.random.default_rng(4), 10_000), axes])
     codes, too_short, _, _ = checked(np.rint(vectors * FORMAT.max_code).astype(np.int64))
@@ -119,12 +123,12 @@ def test_stiff_unit_vectors_stay():
 
 
 def test_stiff_words_at_their_ends():
-    """All vectors of the ends of the word, 0 and its neighbours; only those near 0 are flagged."""
+    """All vectors of the ends of the word, 0 and its neighbours are tried. Only those near 0 are flagged."""
     words = [FORMAT.min_code, FORMAT.min_code + 1, -1, 0, 1, FORMAT.max_code]
     vectors = np.stack(np.meshgrid(*[words] * 3), axis=-1).reshape(-1, 3)
     codes, too_short, _, _ = checked(vectors)
     np.testing.assert_array_equal(too_short, np.abs(vectors).max(axis=1) <= 1)
-    # No component of a unit vector has changed its sign in a word's end.
+    # At the end of a word no component of a unit vector has changed its sign.
     large = (np.abs(vectors) > 1) & ~too_short[:, np.newaxis]
     np.testing.assert_array_equal(np.sign(codes[large]), np.sign(vectors[large]))
 

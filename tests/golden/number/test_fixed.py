@@ -1,4 +1,4 @@
-"""Every operation of the NumPy model against exact rational arithmetic, exhaustively at small widths."""
+"""Every operation of the NumPy model against exact rational arithmetic, by exhaustion of short words."""
 
 import operator
 from fractions import Fraction
@@ -148,7 +148,8 @@ def test_widest_numbers_stay_exact():
     "format", [SQ(1, 17), UQ(0, 17), SQ(2, 42), UQ(2, 1), SQ(1, 0), SQ(1, 62), UQ(1, 62)]
 )
 def test_wrap_of_codes_of_any_size(format):
-    """Against Python's integers: sums that overflow an int64, and integers that do not fit one."""
+    """Wraps are compared with Python's integers: sums that overflow an int64, and integers that do not fit an
+    int64."""
     rng = np.random.default_rng(format.width)
     a, b = rng.integers(-(2**63), 2**63, (2, 5000))
     low, modulus = format.min_code, 1 << format.width

@@ -24,8 +24,8 @@ def root_of_gap(v):
     return reciprocal_root(2 - v)
 
 
-# Function, domain, coefficient held, published coefficients by ascending power, their digits, and the
-# largest absolute error shown there. The tables were made on another grid: where the least error is flat, the
+# Function, domain, coefficient that is held, published coefficients by ascending power, their digits, and the
+# published largest absolute error. The tables were made on another grid. Where the least error is flat, the
 # last digits of the coefficients differ, and the error does not.
 PUBLISHED = {
     "root, degree 1": (reciprocal_root, (ROOT, 2), {}, (0.64004095, -0.07032614), 2e-8, "6.1e-04"),
@@ -71,8 +71,8 @@ PUBLISHED = {
         3e-8,
         "2.5e-05",
     ),
-    # Published are 0.0625277, 0.01144775, 0.00317987 and 7.9e-7; those coefficients give 8.5e-7, and no
-    # polynomial of these terms gives less than 8.08e-7 (the alternation below).
+    # Published are 0.0625277, 0.01144775, 0.00317987 and 7.9e-7. Those coefficients give 8.5e-7, and no
+    # polynomial of these terms gives less than 8.08e-7 (by the alternation below).
     "root held, 3 terms": (
         root_of_gap,
         (0, 2 - ROOT),
@@ -91,14 +91,15 @@ def test_published_fits(name):
     np.testing.assert_allclose(fit, coefficients, rtol=0, atol=digits)
     error, _ = largest_error(function, fit, *domain)
     assert f"{error:.{len(shown) - 6}e}" == shown
-    # No coefficients do better than the fit, those shown in the table among them; the grid's own error and
-    # the solver's tolerance are under 1e-4 of it.
+    # No coefficients do better than the fit, including those in the table. The errors of the grid and of the
+    # solver's tolerance are under 1e-4 of the fit's error.
     assert error <= largest_error(function, np.array(coefficients), *domain)[0] * (1 + 1e-4)
 
 
 @pytest.mark.parametrize("name", PUBLISHED)
 def test_error_alternates(name):
-    """Chebyshev: the fit is the best one if its error reaches its maximum once more than it has terms."""
+    """By Chebyshev's theorem a fit is the best if its error reaches its maximum at one more place than it has
+    terms."""
     function, domain, held, coefficients, _, _ = PUBLISHED[name]
     degree = len(coefficients) - 1
     fit = minimax(function, *domain, degree, held)
@@ -115,11 +116,14 @@ def test_error_alternates(name):
 @pytest.mark.parametrize("octave", [1, 4, 6])
 @pytest.mark.parametrize("degree", [2, 3, 4])
 def test_narrow_domains_far_from_zero(octave, degree):
-    """arccos near 1, where powers of x are all but parallel: against the same fit in ``1 - x``, scaled."""
+    """Near 1, powers of x are almost parallel.
+
+    The fit of arccos is compared with the same fit in ``1 - x``, scaled.
+    """
     low, high = 1 - 2.0**-octave, 1 - 2.0 ** -(octave + 1)
     found = largest_error(np.arccos, minimax(np.arccos, low, high, degree), low, high)[0]
 
-    # 2^-k v with v in [1/2, 1].
+    # x is 2^-k v with v in [1/2, 1].
     def scaled(v):
         return np.arccos(1 - 2.0**-octave * v)
 
@@ -140,7 +144,7 @@ def test_narrow_domains_far_from_zero(octave, degree):
     ],
 )
 def test_printed_digits(function, domain, printed, absolute, relative):
-    """What the coefficients of [T] give as printed."""
+    """Errors of the coefficients of [T] as printed."""
     error = largest_error(function, np.array(printed), *domain)
     assert f"{error[0]:.{len(absolute) - 6}e}" == absolute
     assert f"{error[1]:.3%}".replace("%", " %") == relative
@@ -170,14 +174,14 @@ def test_plain_fit_is_worst_where_meshes_live_and_the_printed_one_exact():
 
 
 def test_printed_root_at_its_end():
-    """Degree 2 of [T] at z = 2, equal normals."""
+    """The polynomial of degree 2 of [T] at z = 2, for equal normals."""
     assert f"{np.polynomial.polynomial.polyval(2.0, (0.681, -0.119, 0.014)):.3f}" == "0.499"
 
 
 def test_plain_fit_dims_flat_faces():
-    """A flat face's normal is 0.06 % too short; 14 LSB of cosquad at n = 100, 126 at 1000.
+    """A flat face's normal is 0.06 % too short: 14 LSB of cosquad at n = 100, and 126 at 1000.
 
-    125 is published, the same figure cut instead of rounded.
+    125 is published, which is the same figure cut in place of rounded.
     """
     length = 2 * minimax(factor_of_cosine, 0, 1, 3).sum()
     assert f"{1 - length:.2%}" == "0.06%"

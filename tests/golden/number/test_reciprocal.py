@@ -10,7 +10,7 @@ from blysk.golden.number.spans import LENGTH_BITS
 
 @pytest.mark.parametrize("bits", [17, 18])
 def test_table(bits):
-    """Every word is the nearest to 1/f, off by a relative 2^-bits at most."""
+    """Every word is the nearest to 1/f, with a relative error of at most 2^-bits."""
     exact = 1 / (1 + np.arange(2048) / 2048)
     exact[0] = 0.5
     words = reciprocal_table(UQ(0, bits))
@@ -22,7 +22,10 @@ def test_table(bits):
 
 
 def test_steps_of_every_length():
-    """dt to a relative 2^-17, dt^2 to ``2^-16 + 2^-17 + 2^-34``; both exact where m - 1 is a power of two."""
+    """dt has a relative error of 2^-17, and dt^2 of ``2^-16 + 2^-17 + 2^-34``.
+
+    Both are exact if m - 1 is a power of two.
+    """
     length = np.arange(1, 1 << LENGTH_BITS)
     steps = np.maximum(length - 1, 1)
     address, shift = reciprocal_address(length - 1)
@@ -37,5 +40,5 @@ def test_steps_of_every_length():
     assert not dt[whole].any()
     assert not squared[whole].any()
     assert (shift.min(), shift.max(), square_shift.max()) == (0, 12, 25)
-    # Normalised, but for the rounding of a square.
+    # The word is normalised, except for the rounding of a square.
     assert reciprocal.codes.min() == square.codes.min() == 1 << 16

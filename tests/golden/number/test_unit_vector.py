@@ -6,9 +6,9 @@ import pytest
 from blysk.golden.number.unit_vector import COMPONENT, ONE, ONE_SQUARED, quantise, values
 from blysk.golden.reference.geometry import normalise
 
-# From the corner of the cell nearest to the origin to the one farthest from it, one component at a time, the
-# length passes 1 in moves of at most one step: the nearest corner on the way is at most half a step off. The
-# length of a move is convex, which adds under 1/ONE of it.
+# Go from the nearest corner of the cell to the farthest corner, one component at a time. The length passes 1
+# in moves of at most one step. So the nearest corner on the way is off by at most half a step. The length of
+# a move is convex, which adds less than 1/ONE of it.
 LENGTH_BOUND = 0.5 * (1 + 1 / ONE)
 
 
@@ -17,14 +17,17 @@ def random_vectors(count, seed):
 
 
 def near_axes(count, seed):
-    """Where one component alone makes the length, the grid of lengths is coarsest."""
+    """Vectors near the axes.
+
+    If one component makes nearly all of the length, the grid of lengths is coarsest.
+    """
     rng = np.random.default_rng(seed)
     vectors = np.column_stack([np.ones(count), rng.uniform(-0.004, 0.004, (count, 2))])
     return normalise(rng.permuted(vectors, axis=1) * rng.choice([-1, 1], (count, 1)))
 
 
 def length_error(codes):
-    """In steps."""
+    """Error of the length, in steps."""
     return np.abs(np.sqrt(np.einsum("ij,ij->i", codes, codes).astype(float)) - ONE)
 
 

@@ -11,7 +11,7 @@ MODE = DisplayMode(Axis(8, 1, 1, 1), Axis(16, 1, 1, 1))
 
 @pytest.mark.parametrize("bits", [RGB888, RGB565, (4, 4, 4)])
 def test_colours(bits):
-    """Black and white stay, order stays, and every channel is within the error stated."""
+    """Black and white stay, the order stays, and every channel is within the stated error."""
     buffer = BandBuffer(MODE, 4, bits)
     every = np.repeat(np.arange(256)[:, np.newaxis], 3, axis=1)
     shown = buffer.shown(buffer.kept(every))
@@ -47,7 +47,8 @@ def test_late_bands_are_background():
 
 
 def test_following():
-    """Of every band and slot: one of the next two slots', the nearest that is not drawn yet."""
+    """For every band and slot, the next band is one of the next two slots' bands: the nearest that is not
+    drawn yet."""
     buffer = BandBuffer(MODE, 2)
     band, slot = np.mgrid[:8, :8]
     following = buffer.following(band, slot)

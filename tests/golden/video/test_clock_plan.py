@@ -26,7 +26,7 @@ def test_rates_and_limits(reference, draw):
 
 
 def test_exact_of_the_boards_clocks():
-    """25 and 50 MHz give 25.2 and 126 MHz to the digit."""
+    """25 and 50 MHz give exactly 25.2 and 126 MHz."""
     for reference in (25_000_000, 50_000_000):
         rates = clock_plan(reference, 25.2e6, 63e6).rates
         assert (rates["pixel"], rates["serial"], rates["sync"]) == (25_200_000, 126_000_000, 63_000_000)

@@ -1,4 +1,4 @@
-"""Words of frames decode to the frames from any bit on; each rule that is broken is told."""
+"""Words of frames decode to the frames, from any bit on. Each broken rule is reported."""
 
 import numpy as np
 import pytest
@@ -14,10 +14,10 @@ FRAMES[0, :4] = 255
 
 
 def bits(words):
-    """In the order in which they are sent."""
+    """Bits of words, in the order in which they are sent."""
     serialiser = Serialiser()
     sent = serialiser.bits(serialiser.compute(words))
-    # The same by definition: a word's bit 0 first.
+    # The same by definition: bit 0 of a word comes first.
     np.testing.assert_array_equal(sent, bits_of(words).swapaxes(1, 2).reshape(-1, 4))
     return sent
 
@@ -29,7 +29,7 @@ def test_round_trip():
 
 
 def spoil(lane, at, value=None, *, roll=0):
-    """Bits with another word in a lane, or a lane that comes later."""
+    """Bits with another word in a lane, or with a lane that comes later."""
     words = DISPLAY.compute(FRAMES)
     if value is not None:
         words[at, lane] = value
@@ -57,7 +57,7 @@ def test_broken_lanes_are_told(sent, message):
 
 
 def test_lean_is_told():
-    """Words of an encoder without balance: the same one, of which bits are mostly ones."""
+    """Words of an encoder without balance are reported: the same word each time, with mostly ones."""
     words = DISPLAY.compute(np.full((1, 16, 24, 3), 255))
     blank = np.isin(words[:, 0], (0b1101010100, 0b0010101011, 0b0101010100, 0b1010101011))
     words[~blank, 0] = 0b0111111111 ^ 0b0000000000

@@ -1,4 +1,4 @@
-"""Counts of every porch, against the figures of the mode."""
+"""Lengths of every porch, against the figures of the mode."""
 
 import numpy as np
 import pytest
@@ -15,7 +15,10 @@ def runs(values):
 
 
 def test_vga():
-    """800x525, 25.2 MHz; both pulses low, 96 pixels and two lines; 16 and 10 lines in front of them."""
+    """The mode has 800x525 pixels at 25.2 MHz.
+
+    Both pulses are low, 96 pixels and two lines long, with 16 pixels and 10 lines before them.
+    """
     assert (VGA.cycles, VGA.pixel_rate, VGA.size) == (800 * 525, 25.2e6, (640, 480))
     frame = DisplayTiming().compute(VGA.cycles, first=45 * 800)
     assert frame["active"].sum() == 640 * 480

@@ -31,7 +31,7 @@ def scene(triangles=400, size=SIZE, back_faces="cull", distance=1.0):
 
 @pytest.mark.parametrize(("lines", "angle"), [(16, 8), (16, 1500), (7, 3000)])
 def test_bands_are_the_whole_frame(lines, angle):
-    """To the bit; bands of 7 lines leave a last one of a line."""
+    """Bands equal the whole frame to the bit. With bands of 7 lines the last band has one line."""
     drawing = Drawing.of([scene()], lines=lines)
     whole, image = drawing.whole(angle), np.zeros((*SIZE[::-1], 3), dtype=np.uint8)
     image[whole.y, whole.x] = whole.color
@@ -40,12 +40,12 @@ def test_bands_are_the_whole_frame(lines, angle):
 
 
 def rounded_coordinates(drawing, exact, found):
-    """Vertices of the drawing, but for their coordinates: those of float64, rounded to the grid."""
+    """Vertices of the drawing with other coordinates: those of float64, rounded to the grid."""
     sent = scene_triangles(exact)
     x, y = found.x.copy(), found.y.copy()
     faces = exact.mesh.faces[sent.source]
     x[faces], y[faces] = sent.triangles.x, sent.triangles.y
-    # They are the same but for a step.
+    # The coordinates differ by at most a step.
     assert max(np.abs(x - found.x).max(), np.abs(y - found.y).max()) <= 1
     return replace(found, x=x, y=y)
 
@@ -62,7 +62,10 @@ def test_a_turned_mesh_keeps_its_looks():
 
 @pytest.mark.parametrize("angle", [8, 2000])
 def test_error_is_that_of_shading_and_of_rounded_coordinates(angle, monkeypatch):
-    """With the coordinates of the exact frame no pixel is off by 0.6 LSB; its own are a step apart."""
+    """With the coordinates of the exact frame no pixel is off by 0.6 LSB.
+
+    The drawing's own coordinates differ by a step.
+    """
     shown = scene()
     drawing = Drawing.of([shown])
     error = errors_with_exact_coordinates(drawing, shown, angle, monkeypatch)
@@ -70,7 +73,7 @@ def test_error_is_that_of_shading_and_of_rounded_coordinates(angle, monkeypatch)
 
 
 def errors_with_exact_coordinates(drawing, shown, angle, monkeypatch, preset=0):
-    """Errors in LSB of the drawn pixels, those of the float64 frame, by its coordinates."""
+    """Errors in LSB of the drawn pixels, and of the float64 frame with its own coordinates."""
     exact = turned(shown, angle)
     frame = render(exact, "phong", drawing.renderer.design.specular.reflection)
     vertices = rounded_coordinates(drawing, exact, drawing.vertices(angle, preset))
@@ -87,7 +90,8 @@ def errors_with_exact_coordinates(drawing, shown, angle, monkeypatch, preset=0):
 
 @pytest.mark.parametrize("model", ["blinn", "phong"])
 def test_several_lights(monkeypatch, model):
-    """Of two lists: matrices into the frame of each one's first light, axes of the other lights in it."""
+    """Two lists with several lights: each has matrices into the frame of its first light, and axes of the
+    other lights in this frame."""
     shown = scene()
     lights = Light((0.5, 0.8, 1)), Light((-1, 0.3, 0.4), (0.3, 0.6, 0.1)), Light((0.2, -1, 0.1))
     scenes = replace(shown, lights=lights), replace(shown, lights=lights[:0:-1])
@@ -100,7 +104,10 @@ def test_several_lights(monkeypatch, model):
 
 @pytest.mark.parametrize("model", ["blinn", "phong"])
 def test_each_light_has_matrices_into_its_frame(monkeypatch, model):
-    """Any direction, that of the viewer, the opposite, and none; lights that are equal share a slot."""
+    """Lights have any direction, that of the viewer, the opposite direction, and none.
+
+    Equal lights share a slot.
+    """
     shown = scene()
     viewer = shown.camera.viewer
     lamps = (0.5, 0.8, 1), viewer, -viewer, (-1, 0.3, 0.4), (0.5, 0.8, 1)
@@ -121,7 +128,8 @@ def test_each_light_has_matrices_into_its_frame(monkeypatch, model):
 
 @pytest.mark.parametrize("angle", [8, 2000])
 def test_error_against_exact_normals_of_every_pixel(angle):
-    """Coordinates a step apart show at the outline, and where triangles are seen at a grazing angle."""
+    """Coordinates that differ by a step matter at the outline, and where triangles are seen at a grazing
+    angle."""
     shown = scene()
     drawing = Drawing.of([shown])
     whole = drawing.whole(angle)
@@ -147,7 +155,7 @@ def test_triangles_near_the_camera_are_dropped_and_counted():
 
 
 def test_commands_of_a_scene():
-    """Constants and the transform in a frame's first band, the draw in every one."""
+    """A frame's first band has constants and the transform, and every band has the draw."""
     drawing = Drawing.of([scene(), replace(scene(), ambient_light=(0, 0, 0))])
     assert len(drawing.commands.starts) == 2
     first, other = (drawing.commands.compute(drawing.commands.starts[1], begins) for begins in (True, False))
@@ -180,7 +188,8 @@ def test_what_does_not_fit_is_refused():
     ],
 )
 def test_commands_past_an_end(words, starts, message):
-    """In hardware they would wrap to other slots, materials, vertices, triangles, or commands."""
+    """These commands would wrap in hardware to other slots, materials, vertices, triangles, or commands, so
+    they are refused."""
     rows = [[KINDS.index(kind), *rest] for kind, *rest in words] + [[0, 0, 0, 0]]
 
     def check():

@@ -27,7 +27,8 @@ def camera(memory):
 
 @pytest.mark.parametrize("angle", [0, 511, 1024, 2500, 4095])
 def test_vertices_land_where_the_camera_sees_them(memory, camera, angle):
-    """The matrix's rounding counts too: with 16 fraction bits less than a step and a half of 1/256 pixel."""
+    """The bound counts the rounding of the matrix: with 16 fraction bits it is less than 1.5 steps of 1/256
+    pixel."""
     motion, part = Motion.of(memory, camera, SIZE, AXIS), memory.parts[0]
     found = VertexTransform().compute(memory.position, memory.normal, motion.matrix(0, angle))
     world = Fixed(COMPONENT, memory.position).values * part.scale
@@ -49,7 +50,7 @@ def test_entries_are_within_their_bound(memory, camera):
 
 
 def test_normals_come_out_in_the_frames_of_their_slots(memory, camera):
-    """Slots of a set of axes behind those of the other; positions are the same."""
+    """The slots of a second set of axes follow those of the first. Positions are the same in both."""
     frame = rotation((0.3, -0.4, 1), 0.7)
     motion = Motion.of(memory, camera, SIZE, AXIS, normal_axes=[np.eye(3), frame])
     for angle in (0, 700, 3000):
@@ -86,7 +87,7 @@ def test_the_memory_holds_the_mesh(memory):
 
 
 def test_block_rams_by_hand():
-    """512 words of 36 bits; 640 x 16 of 27 bits in blocks of 2048 x 9."""
+    """The counts are 512 words of 36 bits, and 640 x 16 words of 27 bits in blocks of 2048 x 9."""
     assert [block_rams(512, 36), block_rams(513, 18), block_rams(10240, 27)] == [1, 1, 15]
     assert MeshMemory.triangles_that_fit(0, 137) == 0
     few, more = (MeshMemory.triangles_that_fit(blocks, 137) for blocks in (10, 20))

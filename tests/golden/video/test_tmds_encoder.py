@@ -16,7 +16,7 @@ ENCODER = TmdsEncoder()
 
 
 def flow_chart(byte, count):
-    """Word as a string of bits 0 to 9, and the disparity after it: figure 3-5, box by box."""
+    """Word as a string of bits 0 to 9, and the disparity after it, by figure 3-5, box by box."""
     d = [int(bit) for bit in f"{byte:08b}"[::-1]]
     q = [d[0]]
     if d.count(1) > 4 or (d.count(1) == 4 and d[0] == 0):
@@ -39,7 +39,7 @@ def flow_chart(byte, count):
 
 @pytest.fixture(scope="module")
 def every():
-    """Words and disparities after them, by byte and disparity before."""
+    """Words and the disparities after them, by byte and disparity before."""
     states = np.arange(-MAX_DISPARITY, MAX_DISPARITY + 2, 2)
     return states, *ENCODER.step(ENCODER.chain(np.arange(256))[:, np.newaxis], states)
 
@@ -54,7 +54,7 @@ def test_every_byte_at_every_disparity(every):
 
 
 def test_disparities_reached(every):
-    """From 0 on every even one up to the bound, and none beyond."""
+    """From 0, every even disparity up to the bound is reached, and none beyond."""
     states, _, after = every
     reached = {0}
     for _ in states:
@@ -63,7 +63,10 @@ def test_disparities_reached(every):
 
 
 def test_words(every):
-    """Each decodes; its disparity is that of its bits; five transitions at most, in control words seven."""
+    """Each word decodes, and its disparity follows from its bits.
+
+    Words have at most five transitions, control words at least seven.
+    """
     states, words, after = every
     np.testing.assert_array_equal(ENCODER.decode(words), np.arange(256)[:, np.newaxis] + 0 * states)
     np.testing.assert_array_equal(2 * bits_of(words).sum(-1) - BITS, after - states)

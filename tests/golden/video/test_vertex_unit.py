@@ -11,7 +11,7 @@ from blysk.golden.video.vertex_unit import ENTRY, OFFSET, VertexTransform
 
 
 def _exact(position, normal, matrix, unit):
-    """Place in steps, depth in codes, N/W, and W in near planes."""
+    """Coordinates in steps, depth in codes, N/W, and W in distances of the near plane."""
     p, n = (Fixed(COMPONENT, codes).values for codes in (position, normal))
     space = p @ Fixed(ENTRY, matrix.position).values.T + Fixed(OFFSET, matrix.offset).values
     w = space[:, 2]
@@ -35,7 +35,7 @@ def test_bounds_hold_and_are_near(distance, size):
             error = np.abs(codes - exact)[kept].max()
             assert 0.5 < error <= VertexTransform.ERROR
         assert 0.5 < np.abs(found.depth - depth)[kept].max() <= VertexTransform.DEPTH_ERROR
-        # A normal of length 1 may turn to components over 1: those saturate.
+        # A normal of length 1 may turn to components over 1, which saturate.
         full = np.abs(scaled * w[:, np.newaxis]).max(axis=1) < ONE * 2.0**-17
         error = np.abs(found.normal * 2.0**-23 - scaled)[kept & full].max()
         assert error <= VertexTransform.NORMAL_ERROR
