@@ -84,12 +84,12 @@ coarse test. In other compact designs one span waits in a register.
 class RendererUnit(wiring.Component):
     """Turns triangles into the pixels to write. `Renderer` is the bit-accurate model.
 
-    Triangles go through `GeometryUnit`, `ShadingPipelineUnit` and `DepthTesterUnit`. Spans wait for the
-    pipeline in a FIFO or a register (`WAITING_SPANS`). The depths of the spans go beside the pipeline, in
-    another FIFO. With a coarse depth test a span also waits for the test's answer. Then the pipeline takes
-    the span, or the unit drops it in one cycle. The units work at the same time. If no unit waits for long, a
-    frame takes as many cycles as the slowest unit alone. The design's `Build` has the styles, the lanes of
-    triangle setup and the coarse test.
+    `GeometryUnit` turns triangles into spans, `ShadingPipelineUnit` turns spans into pixels, and
+    `DepthTesterUnit` drops hidden pixels. Spans wait for the pipeline in a FIFO or a register
+    (`WAITING_SPANS`). The depths of the spans go beside the pipeline, in another FIFO. With a coarse depth
+    test a span also waits for the test's answer. Then the pipeline takes the span, or the unit drops it in
+    one cycle. The units work at the same time. If no unit waits for long, a frame takes as many cycles as the
+    slowest unit alone. The design's `Build` has the styles, the lanes of triangle setup and the coarse test.
 
     Frame constants are written while no span is inside. If the material changes from a span to the next, the
     next span waits until the pipeline is empty, see `ShadingPipelineUnit`.
@@ -130,7 +130,8 @@ class RendererUnit(wiring.Component):
     Attributes
     ----------
     idle : Signal
-        High while no triangle, span or pixel is inside. It rises a cycle after the last has left.
+        High while no triangle, span or pixel is inside. It rises a cycle after the last triangle, span or
+        pixel has left.
 
     Source: docs/theory/geometry.md#composition; [T] figure 4.10.
     """
@@ -191,8 +192,8 @@ class RendererUnit(wiring.Component):
         ]
         known, drops = self._judge(m, source, room, made.ready, ready)
         if geometry.compact and not geometry.vectors and self.coarse is None:
-            # A FIFO of 16 words in look-up tables would save some cycles, and cost as much logic as these
-            # save.
+            # Geometry is slower than shading here, so spans hardly wait. The look-up tables of a FIFO would
+            # cost as much as the register that it replaces.
             connect_register(m, "waiting_span", made, ready)
         else:
             connect_late_fifo(m, "spans", made, ready, WAITING_SPANS)

@@ -116,7 +116,7 @@ def albedo_bound(
     lights : sequence of LightErrors
         Bounds of the light on each material.
     attributes : AttributeErrors, optional
-        Of a frame by triangles. By default those of the spans' own words.
+        Errors of the attributes in a frame by triangles. By default the errors of the spans' own words.
 
     Returns
     -------

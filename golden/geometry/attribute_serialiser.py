@@ -11,7 +11,7 @@ __all__ = ["AttributeSerialiser"]
 
 @dataclass(frozen=True)
 class AttributeSerialiser:
-    """The attributes of sorted triangles, one after the other, and `least`.
+    """Gives the attributes of sorted triangles one after the other, with `least`.
 
     ``least`` is a lower bound of the length m of N/W in the triangle: ``m >= max(9/16 M, L, 0)``. Components
     are cut to 11 fraction bits. If a component is negative at the first corner, its bits are inverted at all

@@ -42,7 +42,7 @@ class SceneTriangles:
         is off by up to 16 steps of 2^-24 of the range of 1/W. At r times the least W this is ``r 2^-20`` of
         W. If r is over 1,000, surfaces 0.1 % apart may change places.
     several_levels : int
-        Number of triangles with levels of their textures more than 1 apart at their corners. A triangle is
+        Number of triangles at whose corners the level of the texture differs by more than 1. A triangle is
         drawn with a single level, see `triangle_levels`.
     levels : int64 array, shape (faces,)
         Level of each face of the mesh; 0 without textures.
@@ -180,7 +180,9 @@ def check_texels(scene: Scene) -> None:
     if np.ptp(texels, axis=1).max(initial=0) > most:
         raise ValueError(f"a triangle crosses more than {most} texels; divide the triangles")
     if (~periodic & (np.abs(texels).max(axis=1, initial=0) > beyond)).any():
-        raise ValueError(f"a corner is over {beyond} texels from the border of a clamped image; divide it")
+        raise ValueError(
+            f"a corner is over {beyond} texels from the border of a clamped image; divide the triangle"
+        )
 
 
 def _surface_of(scene: Scene, surface: AttributeSpans) -> np.ndarray:
@@ -199,9 +201,10 @@ def _surface_of(scene: Scene, surface: AttributeSpans) -> np.ndarray:
 def _placed(
     scene: Scene, source: np.ndarray, records: np.ndarray
 ) -> tuple[dict[str, np.ndarray], np.ndarray, int]:
-    """Placement of texture coordinates, which become attributes from -1 to 1; levels of faces.
+    """Placement of texture coordinates, and levels of faces.
 
-    The third result is the number of triangles with several levels.
+    In ``records`` attributes from -1 to 1 replace the texture coordinates. The third result is the number of
+    triangles with several levels.
     """
     check_texels(scene)
     coordinates = records[..., -2:]

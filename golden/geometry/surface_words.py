@@ -12,11 +12,11 @@ __all__ = ["SurfaceWords"]
 
 @dataclass(frozen=True)
 class SurfaceWords:
-    """Words of `AttributeSpans` from the planes of a triangle: shifts and cuts alone.
+    """Makes words of `AttributeSpans` from the planes of a triangle, by shifts and cuts.
 
-    The attributes of a surface are further planes of a triangle, beside N/W and the depth. A corner has
-    ``U = A s`` of each colour and texture coordinate A, and then s. This is 1/W over the largest 1/W of the
-    triangle, times `LARGEST`. Orthographic triangles have ``s = LARGEST``. A texture coordinate A is ``(texel
+    The attributes of a surface are further planes of a triangle, beside N/W and the depth. A corner has ``U =
+    A s`` of each colour and texture coordinate A, and then s. s is 1/W over the largest 1/W of the triangle,
+    times `LARGEST`. Orthographic triangles have ``s = LARGEST``. A texture coordinate A is ``(texel
     - base)/2^range``, from -1 to 1. Software chooses base, range and level of each triangle.
 
     ========== ============ =====================================================================
@@ -29,7 +29,7 @@ class SurfaceWords:
     exponent   UQ(4, 0)     e, 0 to 9: the largest with which all steps fit
     ========== ============ =====================================================================
 
-    A step has 32 fraction bits. So with ``e = 9`` it is exact. Steps are taken modulo 2, as in
+    A step has 32 fraction bits. So with ``e = 9`` a step is exact. Steps are taken modulo 2, as in
     `AttributeSpans`.
 
     The error of a plane is under ``1.1 2^-11`` in every triangle of the grid (`GradientSetup.error`). So no
@@ -47,7 +47,7 @@ class SurfaceWords:
     """Largest 1/W of a triangle."""
     LARGEST_EXPONENT = PLANE_FORMAT.fraction_bits - FORMAT.fraction_bits
     ERROR = 5.5 * FORMAT.step
-    """Bound of the error of a word of a pixel, without that of the planes."""
+    """Bound of the error of a pixel's word, without the error of the planes."""
 
     def compute(self, start: np.ndarray, step: np.ndarray) -> SpanAttributes:
         """Bit-accurate words, without base, range and level.

@@ -185,7 +185,7 @@ class Triangles:
     surface : int64 array, shape (T, 3, S), optional
         Vertex colours and texture coordinates over W, then 1/W, `ATTRIBUTE`, see `SurfaceWords`.
     base : int64 array, shape (T, 2), optional
-        Whole texel from which the texture coordinates of a triangle count, see `SpanAttributes`.
+        Whole texel from which the texture coordinates of a triangle are counted, see `SpanAttributes`.
     range, level : int64 arrays, shape (T,), optional
         Range of these coordinates, and level of the texture.
     """

@@ -88,7 +88,9 @@ def triangle_levels(
 def texel_places(
     scene: Scene, triangle: np.ndarray, levels: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Level of each span; whether u and v repeat, and texels of the level, each of shape (spans, 2).
+    """Level of each span; whether u and v repeat; columns and rows of the level.
+
+    The second and the third result have the shape (spans, 2).
 
     Parameters
     ----------

@@ -37,7 +37,7 @@ def serial_attribute_shape() -> data.StructLayout:
 
 
 class AttributeSerialiserUnit(wiring.Component):
-    """The n attributes of each triangle, one after the other. `AttributeSerialiser` is the model.
+    """Gives the n attributes of each triangle one after the other. `AttributeSerialiser` is the model.
 
     n is 4, or more with a surface. The first attribute is offered n + 5 cycles after the triangle is taken
     in. The other attributes follow on the next cycles, unless the output waits. The next triangle is taken in

@@ -220,7 +220,8 @@ class GeometryUnit(wiring.Component):
     Attributes
     ----------
     idle : Signal
-        High while no triangle and no span is inside. It rises one cycle after the last has left.
+        High while no triangle and no span is inside. It rises one cycle after the last triangle or
+        span has left.
 
     Source: docs/theory/geometry.md#composition; [T] figure 4.10.
     """

@@ -149,7 +149,7 @@ class SerialVectorsUnit(wiring.Component):
 
     @property
     def _final(self) -> int:
-        """Place of the last attribute that a piece has in step 4."""
+        """Place of the last attribute in step 4: z of N/W, or with ``surface`` its last word."""
         return ATTRIBUTES - 2 if self._surface is None else self._count - 1
 
     def _is_last(self, place: Signal):

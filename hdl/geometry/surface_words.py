@@ -45,7 +45,7 @@ def placement_of(surface: AttributeSpans | None) -> dict:
 
 
 def corner_surface_shape(surface: AttributeSpans | None) -> dict:
-    """Member ``surface``: the attributes at three corners, then 1/W."""
+    """Member ``surface``: for each of three corners the attributes, then 1/W."""
     if surface is None:
         return {}
     words = data.ArrayLayout(FixedShape(ATTRIBUTE), surface_count(surface))
