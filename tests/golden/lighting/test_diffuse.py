@@ -16,7 +16,8 @@ def compute(codes):
 
 
 def test_error():
-    """2^-18, of all results about every rounding point; and 2^-17 more from the largest number on."""
+    """Results about every rounding point are off by at most 2^-18, and by 2^-17 more from the largest number
+    on."""
     middles = (np.arange(2**17) << 17) + 2**16
     codes = (middles[:, np.newaxis] + [-(2**16), -1, 0, 1]).ravel()
     cosine = codes * 2.0**-34
@@ -25,7 +26,7 @@ def test_error():
     assert error[below].max() == 2.0**-18
     assert error[~below].max() <= 2.0**-17
     assert 1 - compute([2**34]).values == [2.0**-17]
-    # Two unit vectors reach (1 - 2^-17)^2 and no more: within the bound of the rounding.
+    # Two unit vectors reach at most (1 - 2^-17)^2, which is within the bound of the rounding.
     peak = ONE_SQUARED.codes.item()
     assert abs(compute([peak]).values[0] - ONE_SQUARED.values) <= 2.0**-18
 
@@ -36,7 +37,10 @@ def test_rises_with_the_cosine():
 
 
 def test_stiff_terminator_and_largest_and_smallest_codes():
-    """Nothing from behind, at the terminator itself neither; the smallest positive cosine is not dark."""
+    """A light from behind gives nothing, and neither does a light at the terminator.
+
+    The smallest positive cosine is not dark.
+    """
     codes = [FORMAT.min_code, -(2**34), -(2**16), -1, 0, 1, 2**16 - 1, 2**16, 2**34, FORMAT.max_code]
     largest = 2**17 - 1
     np.testing.assert_array_equal(compute(codes).codes, [0, 0, 0, 0, 0, 0, 0, 1, largest, largest])
@@ -44,23 +48,27 @@ def test_stiff_terminator_and_largest_and_smallest_codes():
 
 
 def test_stiff_terminator_of_a_turning_normal():
-    """N through a right angle to L, in steps of 0.001 degrees: the term sets in where the light does."""
+    """N turns through a right angle to L in steps of 0.001 degrees. The term begins where the light does."""
     angle = np.radians(90 + np.arange(-1000, 1001) * 1e-3)
     codes = np.rint(ONE_SQUARED.codes * np.cos(angle)).astype(np.int64)
     term = compute(codes)
     assert np.abs(term.values - np.maximum(np.cos(angle), 0)).max() <= 2.0**-18 + 2.0**-16 * np.cos(angle[0])
     assert not term.codes[UNIT.dark(Fixed(FORMAT, codes))].any()
-    # Lit, but darker than half a step, is 0 too: no step at the terminator.
+    # Where a pixel is lit but darker than half a step, the term is also 0. So there is no step at the
+    # terminator.
     assert np.abs(np.diff(term.codes)).max() <= 3
 
 
 def test_stiff_normals_of_wrong_length():
-    """N of length 1 +- 1/256 or 0: the term is that much larger, to 1 at most, or smaller; no other error."""
+    """If N has length 1 +- 1/256 or 0, the term is larger or smaller by this factor, and at most 1.
+
+    There is no other error.
+    """
     cosine = np.cos(np.radians(np.linspace(0, 180, 20_001)))
     for length in (0, 1 - 1 / 256, 1 + 1 / 256):
         codes = np.rint(ONE_SQUARED.codes * length * cosine).astype(np.int64)
         ideal = np.clip(length * cosine, 0, 1)
-        # Read 2^-16 short, rounded, and what is over the largest number.
+        # The cosine is 2^-16 too small, rounded, and limited to the largest number.
         bound = 2.0**-16 * ideal + 2.0**-18 + 2.0**-17 * (ideal > 1 - 2.0**-17)
         assert (np.abs(compute(codes).values - ideal) <= bound).all()
         assert not compute(codes).codes[cosine < 0].any()

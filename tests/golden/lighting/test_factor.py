@@ -14,7 +14,7 @@ def compute(specular, factor):
 
 
 def test_every_factor_of_some_terms():
-    """Under 2^-17 less than the product, and never more."""
+    """The result is less than 2^-17 under the product, and never over it."""
     factor = np.arange(2**17)
     for term in (0, 1, 3, 2**16, 99_991, TOP):
         exact = term * factor / 2**34
@@ -23,7 +23,7 @@ def test_every_factor_of_some_terms():
 
 
 def test_ends():
-    """A factor of 0 leaves nothing; one of 1, which is a step short, all but a step."""
+    """A factor of 0 leaves nothing. A factor of 1, which is a step less than 1, takes off a step."""
     terms = np.array([0, 1, 2**16, TOP])
     assert not compute(terms, 0 * terms).codes.any()
     assert (terms - compute(terms, 0 * terms + TOP).codes).tolist() == [0, 1, 1, 1]

@@ -1,4 +1,4 @@
-"""Highlight gate: every decision at reduced width, spans at full width through the pipeline's model."""
+"""Highlight gate: every decision with short words, and spans with full words through the pipeline's model."""
 
 import numpy as np
 import pytest
@@ -25,7 +25,7 @@ MARGIN = HighlightGate(LIMITS).margin
 
 
 def arc_maximum(a, b, angle, shares=513):
-    """Largest N·H over points of the arc, from the sine formula: no use of the gate's."""
+    """Largest N·H at points of the arc, by the sine formula, which the gate does not use."""
     x = np.linspace(0, 1, shares)
     largest = np.full(np.broadcast_shapes(np.shape(a), np.shape(b), np.shape(angle)), -np.inf)
     for share in x.tolist():
@@ -49,9 +49,10 @@ def test_every_decision_at_reduced_width(bits):
         psi = np.arccos(1 - u.values)
         maximum = arc_maximum(a / 2**bits, b / 2**bits, psi)
         threshold = codes / 2**bits
-        # Of 513 points one is within psi/1024 of the maximum, which is lower there by under 4e-7.
+        # One of 513 points is within psi/1024 of the maximum, and lower by less than 4e-7.
         assert not (~lit & (maximum**2 >= threshold + 1e-12)).any()
-        # What is let through is near: w is cut by 2^(1-F), M^2 = (d^2 + 2abu) / (u (2 - u)).
+        # Spans that the gate lets through are near the threshold: w is cut by 2^(1-F), M^2 = (d^2 + 2abu) /
+        # (u (2 - u)).
         needless = lit & (maximum**2 < threshold - 2.0 ** (1 - bits) / (2 - u.values) - 4e-7)
         assert not needless.any()
         lit_of_all.append(lit.mean())
@@ -59,7 +60,8 @@ def test_every_decision_at_reduced_width(bits):
 
 
 def random_spans(rng, count, exponent, gate):
-    """Normals and H about which the largest N·H of the arc is near the threshold, inside or at an end."""
+    """Normals and H for which the largest N·H of the arc is near the threshold, inside the arc or at an
+    end."""
     degrees = rng.choice([0.0, 1e-4, 0.1, 1.0, 44.99, -1.0], count, p=[0.05, 0.05, 0.1, 0.1, 0.1, 0.6])
     degrees = np.where(degrees < 0, rng.uniform(0, 45, count), degrees)
     tau = np.sqrt(gate.thresholds.values[exponent])
@@ -78,14 +80,14 @@ def largest_cosine(interpolator, left, right, halfway, length):
 
 
 def check_spans(gate, rng, count, shaded_share=1 / 20, method=METHOD):
-    """Run so many spans; most are decided by the last bits of the comparison."""
+    """Check some spans. The last bits of the comparison decide most of them."""
     dark, shaded = 0, 0
     for exponent in EXPONENTS:
         left, right, halfway = random_spans(rng, count // len(EXPONENTS), exponent, gate)
         length = rng.choice([1, 2, 3, 5, 8, 16], len(left), p=[0.1, 0.3, 0.3, 0.2, 0.08, 0.02])
         lit = gate.compute(*component_words(left, right, halfway), exponent)
         cosine = largest_cosine(method, left, right, halfway, length)
-        # The specular term falls with N·H: that of the largest is the largest.
+        # The specular term falls as N·H falls, so the term of the largest N·H is the largest.
         term = gate.specular.compute(cosine, np.zeros(len(lit), bool), exponent)
         assert not term.codes[~lit].any()
         dark += np.count_nonzero(~lit)
@@ -109,7 +111,7 @@ def test_no_pixel_is_suppressed_with_other_middle_normals():
         method = QuadraticInterpolator(middle_normal=MiddleNormal(fit))
         gate = HighlightGate(method.gate_limits)
         steps[fit] = gate.margin * 2**17
-        # With a wide margin, spans about the threshold are seldom visible.
+        # With a wide margin, spans about the threshold seldom have a visible highlight.
         check_spans(gate, np.random.default_rng(10), 20_000, shaded_share=1 / 100, method=method)
     assert steps["exact"] * 2.0**-17 == MARGIN
     others = sorted(steps.values())[1:]
@@ -117,7 +119,7 @@ def test_no_pixel_is_suppressed_with_other_middle_normals():
 
 
 def test_margin_of_the_default_fit_is_not_enough_for_others():
-    """With a normal that is 0.38 % too long the default's margin would lose highlights."""
+    """With a normal that is 0.38 % too long, the margin of the default fit would lose highlights."""
     gate, other = HighlightGate(LIMITS), QuadraticInterpolator(middle_normal=MiddleNormal("minimax_2"))
     rng = np.random.default_rng(11)
     left, right, halfway = random_spans(rng, 20_000, 300, gate)
@@ -134,7 +136,7 @@ def test_no_pixel_of_ten_million_spans_is_suppressed():
 
 
 def test_long_spans():
-    """The differences' rounding is largest at pixel 4095."""
+    """The rounding of the differences is largest at pixel 4095."""
     gate, rng = HighlightGate(LIMITS), np.random.default_rng(4)
     for exponent in (10, 1000):
         left, right, halfway = random_spans(rng, 150, exponent, gate)
@@ -146,7 +148,8 @@ def test_long_spans():
 
 
 def test_steps_1_and_2_of_the_proof():
-    """The curve by the weights of its ends, its length inside the unit circle, and the bound on N.H."""
+    """Checks the curve by the weights of its ends, its length inside the unit circle, and the bound on
+    N.H."""
     rng = np.random.default_rng(7)
     angle = np.r_[1e-3, rng.uniform(0, 45, 1998), 45]
     left, right = pairs_at(rng, 2000, angle)
@@ -157,7 +160,7 @@ def test_steps_1_and_2_of_the_proof():
     assert min(alpha.min(), beta.min(), k.min()) >= 0
     middle = h * (left + right)
     g, p = 2 * right - 4 * middle + 2 * left, 4 * middle - right - 3 * left
-    # Step 5 has these as its largest.
+    # Step 5 has these as its largest values.
     assert 0.304 < np.linalg.norm(g, axis=1).max() < 0.305
     assert 0.82 < np.linalg.norm(p, axis=1).max() < 0.83
     curve = (g[:, np.newaxis] * t[:, np.newaxis] + p[:, np.newaxis]) * t[:, np.newaxis] + left[:, np.newaxis]
@@ -167,7 +170,8 @@ def test_steps_1_and_2_of_the_proof():
     squared = 1 - (1 - c) ** 2 * s**2 * (1 - s**2)
     assert np.abs((curve**2).sum(axis=-1) - squared).max() < 1e-13
     assert squared.max() <= 1
-    # A vector p of the plane with any projections, also negative ones; the arc's maximum from its points.
+    # A vector p of the plane with any projections, also negative ones. The maximum over the arc comes from
+    # its points.
     a, b = rng.uniform(-1, 1, (2, 2000, 1))
     maximum = np.maximum(arc_maximum(a, b, psi), np.maximum(a, b))
     peak = np.sqrt((a - b) ** 2 + 2 * a * b * (1 - np.cos(psi))) / np.sin(psi)
@@ -177,7 +181,10 @@ def test_steps_1_and_2_of_the_proof():
 
 
 def test_step_3_of_the_proof():
-    """The arc's maximum grows with psi and with a and b that are not negative; the words are over them."""
+    """The maximum over the arc grows with psi, and with a and b that are not negative.
+
+    The words are at least the exact values.
+    """
     rng = np.random.default_rng(8)
     count = 200_000
     a, b = rng.uniform(0, 1, (2, count))
@@ -193,7 +200,7 @@ def test_step_3_of_the_proof():
     base = largest(a, b, psi)
     for grown in (largest(a + more[0], b, psi), largest(a, b + more[1], psi), largest(a, b, psi + more[2])):
         assert np.all(grown >= base * (1 - 1e-9))
-    # u by its word: what is cut off and the square of the code of length 1 take under 2.2 of 3 steps.
+    # The cut of u and the square of the code of length 1 take less than 2.2 of the 3 steps.
     gate = HighlightGate(LIMITS)
     omega = gate.one_squared.codes.item()
     exact = rng.integers(0, int(omega * (1 - np.cos(np.radians(45)))), count)
@@ -201,7 +208,7 @@ def test_step_3_of_the_proof():
     over = word * 2.0**-18 - exact / omega
     assert over.min() > 0.8 * 2.0**-18
     assert over.max() <= 3 * 2.0**-18
-    # a and b by theirs, and where the word saturates, its square is over every threshold.
+    # The same for a and b. If a word saturates, its square is over every threshold.
     dot = Fixed(DotProduct().result_format, rng.integers(-(2**34), 2**34, count))
     level = gate._level(dot).values
     assert np.all((level >= dot.values) | (level == gate.level_format.max_code * gate.level_format.step))
@@ -212,7 +219,7 @@ def test_step_3_of_the_proof():
 
 @pytest.mark.parametrize("model", SPECULAR_MODELS + FURTHER_MODELS)
 def test_the_term_is_0_everywhere_below(model):
-    """No second lobe: the unit shades nothing from N.H = -1 up to the threshold and its margin."""
+    """There is no second lobe: from N.H = -1 up to the threshold less its margin the unit gives 0."""
     gate, rng = HighlightGate(LIMITS, Specular(REFLECTION_MODELS[model])), np.random.default_rng(9)
     for exponent in (2, 3, 5, 10, 20, 100, 500, 1000):
         # T was cut, so the root is under tau.
@@ -226,7 +233,7 @@ def test_the_term_is_0_everywhere_below(model):
 
 
 def test_margin_covers_the_pipeline():
-    """The sum of step 5 of the proof, and how near the pixels come to it."""
+    """Checks the sum of step 5 of the proof, and how near pixels come to it."""
     k = 4094
     terms = [
         np.sqrt(3) * MiddleNormal.ERROR,
@@ -245,7 +252,7 @@ def test_margin_covers_the_pipeline():
         r = np.einsum("ij,ij->i", left, right) * 2.0**-34 / one
         maximum = np.maximum(arc_maximum(a, b, np.arccos(np.minimum(r, 1 - 1e-12)), 101), np.maximum(a, b))
         worst = max(worst, (cosine.values - maximum).max())
-        # What is let through is near the threshold, so the margins cost little.
+        # Spans that the gate lets through are near the threshold, so the margins cost little.
         lit = gate.compute(*component_words(left, right, halfway), exponent)
         assert (maximum[lit] ** 2 > gate.thresholds.values[exponent] - 9 * 2.0**-17).all()
     assert MARGIN / 8 < worst < MARGIN
@@ -257,7 +264,7 @@ def test_thresholds_lie_under_what_the_unit_shades():
         gate = HighlightGate(LIMITS, Specular(REFLECTION_MODELS[model]))
         lowest = gate.thresholds.values
         for exponent in (1, 2, 3, 10, 100, 500, 999, 1000):
-            # The largest N·H that is shaded 0, by halving.
+            # Bisection finds the largest N·H whose term is 0.
             low, high = -ONE_SQUARED.codes.item(), ONE_SQUARED.codes.item()
             operand = gate.specular.operand_format
             shade = lambda code, gate=gate, n=exponent, operand=operand: gate.specular.compute(  # noqa: E731
@@ -275,7 +282,7 @@ def test_thresholds_lie_under_what_the_unit_shades():
 
 
 def test_stiff_spans():
-    """Equal and opposite normals, spans out of range, corners of the words, a highlight inside one span."""
+    """Equal and opposite normals, spans out of range, ends of the words, a highlight inside a span."""
     gate, rng = HighlightGate(LIMITS), np.random.default_rng(6)
 
     def lit(left, right, halfway, exponent):
@@ -286,12 +293,12 @@ def test_stiff_spans():
         halfway = unit_codes(rng, 300)
         for exponent in (1, 10, 1000):
             assert lit(left, right, halfway, exponent).all()
-    # Away from H nothing is lit, at H everything is.
+    # Away from H nothing is lit, at H everything is lit.
     left, right = code_pairs_at(rng, 300, rng.choice([0, 1e-4, 1, 30], 300))
     assert not lit(left, right, -left, 3).any()
     assert lit(left, right, left, 1000).all()
     assert lit(left, right, right, 1000).all()
-    # A highlight of 5 degrees in the middle of 40.
+    # A highlight of 5 degrees is in the middle of a span of 40 degrees.
     half = np.radians(20)
     ends = quantise(np.array([[-np.sin(half), 0, np.cos(half)], [np.sin(half), 0, np.cos(half)]]))
     for exponent in (100, 1000):

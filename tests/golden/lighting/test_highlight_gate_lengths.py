@@ -1,4 +1,4 @@
-"""Highlight gate: normals that are not unit vectors, and where the gate does not hold for them."""
+"""Highlight gate: normals that are not unit vectors, and methods for which the gate then fails."""
 
 import numpy as np
 import pytest
@@ -22,7 +22,7 @@ LIMITS = QuadraticInterpolator().gate_limits
 
 
 def suppressed(model, left, right, halfway, length, exponent, method="quadratic", operand=None):
-    """Which spans are not lit, and which of these have a term other than 0 in the pipeline of a method."""
+    """Which spans the gate stops, and which of these have a term other than 0 in the pipeline of a method."""
     pipeline = preset(method, model, operand=operand)
     interpolator = pipeline.interpolator
     gate = HighlightGate(interpolator.gate_limits, pipeline.specular)
@@ -34,7 +34,7 @@ def suppressed(model, left, right, halfway, length, exponent, method="quadratic"
         product = Chord().operand if interpolator.uses_chord else DotProduct().compute
         highlight = product(normals, halfway[span])
     else:
-        # One span at a time, as H is that of all spans of a call.
+        # Spans are computed one at a time, because all spans of a call share H.
         found = [
             interpolator.compute(left[k], right[k], length[k], halfway[k], halfway[k]).highlight
             for k in (slice(k, k + 1) for k in range(len(length)))
@@ -52,7 +52,7 @@ def codes_of(vectors):
 
 
 def spans_of_length(rng, count, low, high, threshold):
-    """Ends of the given lengths, 0 to 60 degrees apart, and H a little farther away than a threshold."""
+    """Ends with the given lengths, 0 to 60 degrees apart, and H a little farther away than a threshold."""
     degrees = rng.choice([0, 1e-4, 1, -1], count, p=[0.1, 0.1, 0.1, 0.7])
     degrees = np.where(degrees < 0, rng.uniform(0, 60, count), degrees)
     lengths = rng.uniform(low, high, (2, count, 1))
@@ -66,8 +66,8 @@ def spans_of_length(rng, count, low, high, threshold):
 def saturating_spans(rng, count, excess, threshold):
     """Ends ``(1, y, z)`` and ``(1, y, -z)``, too long by up to ``excess``, and H near the y axis.
 
-    The middle normal would have a first component over 1. It saturates, and where H leans the other way, the
-    pixels in the middle are nearer to H than the curve is. Only for y over the threshold can H be near it.
+    The middle normal would have a first component over 1. It saturates. If H leans the other way, pixels in
+    the middle are then nearer to H than the curve is. H can be near the middle only for y over the threshold.
     """
     beyond = np.sqrt((1 + excess * rng.uniform(0.9, 1, count)) ** 2 - 1)
     share = rng.uniform(0, np.pi / 2, count)
@@ -82,11 +82,11 @@ def saturating_spans(rng, count, excess, threshold):
 
 @pytest.mark.parametrize("exponent", [1, 2, 3, 10, 100, 500, 1000])
 def test_stiff_normals_of_wrong_length(exponent):
-    """Off by up to 1/256, or short by any amount, at every angle: no suppressed span has a term.
+    """With ends off by up to 1/256, or too short by any amount, no stopped span has a term, at any angle.
 
-    Steps 1 to 4 of the proof hold for ends of any length: they follow the codes. What a wrong length changes
-    is step 5. G and P stay in their words up to a length of 1.075. Before that, a component of the middle
-    normal over 1 saturates, for ends over 1 alone: see `test_stiff_normals_too_long`.
+    Steps 1 to 4 of the proof hold for ends of any length, because they follow the codes. A wrong length
+    changes only step 5. G and P fit their words up to a length of 1.075. Before that, a component of the
+    middle normal over 1 saturates, which needs ends over 1: see `test_stiff_normals_too_long`.
     """
     rng, threshold = (
         np.random.default_rng(exponent),
@@ -99,7 +99,8 @@ def test_stiff_normals_of_wrong_length(exponent):
         assert not lost.any()
         dark += np.count_nonzero(not_lit)
     assert (dark > 5000) == (exponent > 1)
-    # Opposite, right and nearly right angles, of wrong length too: all over 45 degrees, so lit.
+    # Opposite normals, and normals at right or nearly right angles, also of wrong length, are over 45 degrees
+    # apart. So the gate lets them through.
     out_of_range = pairs_at(rng, 900, np.repeat([89.9, 90, 180], 300))
     for scale in (1 - 1 / 256, 1 + 1 / 256):
         not_lit, _ = suppressed(
@@ -114,7 +115,8 @@ def test_stiff_normals_of_wrong_length(exponent):
 
 @pytest.mark.parametrize("method", ["linear", "quadratic-eval", "quadratic-horner"])
 def test_stiff_normals_of_wrong_length_by_other_methods(method):
-    """As the quadratic method by differences, where N.H is taken of normals that follow the ends' lengths."""
+    """Other methods behave as the quadratic method by differences if their N.H comes from normals that follow
+    the ends' lengths."""
     rng = np.random.default_rng(13)
     for exponent in (2, 10, 100, 1000):
         threshold = np.sqrt(HighlightGate(LIMITS).thresholds.values[exponent])
@@ -135,13 +137,14 @@ def test_stiff_normals_of_wrong_length_by_other_methods(method):
     ],
 )
 def test_stiff_normals_of_wrong_length_lose_highlights(method, operand, short, long):
-    """Where the gate does not hold for lengths off by 1/256: these methods count on unit normals.
+    """For lengths off by 1/256 the gate fails with these methods, which count on unit normals.
 
-    The gate goes by the N.H of the codes. A bisection makes short normals longer: a pixel is up to 1/256
-    nearer to H than the gate knows. Too long ones make the angle of a half chord wider than that of the dot
-    product. The other way round nothing is lost, nor with unit normals.
+    The gate takes the N.H of the codes. A bisection makes short normals longer, so a pixel may be up to 1/256
+    nearer to H than the gate computes. If normals are too long, the angle of a half chord is wider than that
+    of the dot product. With lengths off to the other side nothing is lost, and with unit normals nothing is
+    lost.
     """
-    # One call a span costs more than arithmetic.
+    # One call for each span costs more than the arithmetic.
     count = 120 if method in ("angular", "recurrence") else 4000
     threshold = np.sqrt(HighlightGate(LIMITS).thresholds.values[100])
     for scale, loses in ((1 - 1 / 256, short), (1.0, False), (1 + 1 / 256, long)):
@@ -156,7 +159,10 @@ def test_stiff_normals_of_wrong_length_lose_highlights(method, operand, short, l
 
 @pytest.mark.parametrize("exponent", [1, 2, 3, 10, 100, 500, 1000])
 def test_stiff_normals_of_length_0_and_corners(exponent):
-    """A vector 0 counts as 90 degrees; every corner, edge and face of the words' cube, in N_l, N_r and H."""
+    """A vector 0 counts as 90 degrees.
+
+    Every corner, edge and face of the words' cube is tried in N_l, N_r and H.
+    """
     rng = np.random.default_rng(exponent)
     unit = unit_codes(rng, 500)
     zero = np.zeros_like(unit)
@@ -173,9 +179,10 @@ def test_stiff_normals_of_length_0_and_corners(exponent):
 
 @pytest.mark.parametrize(("model", "exponent"), [("cosquad", 2), ("lyon3", 6), ("exp", 10)])
 def test_stiff_normals_too_long(model, exponent):
-    """The bound on lengths: none is lost to 1 + 1/128, and some are at 1 + 1/16.
+    """Up to a length of 1 + 1/128 no highlight is lost, and at 1 + 1/16 some are.
 
-    Where the middle normal saturates, the three wide models with the lowest threshold over 0 suffer first.
+    Where the middle normal saturates, the three wide models with the lowest threshold over 0 are the first to
+    lose highlights.
     """
     threshold = np.sqrt(HighlightGate(LIMITS, Specular(REFLECTION_MODELS[model])).thresholds.values[exponent])
     assert 0 < threshold < 0.07

@@ -17,7 +17,7 @@ def compute(ambient, diffuse_color, specular_color, diffuse, specular, fraction_
 
 
 def exact(ambient, diffuse_color, specular_color, diffuse, specular, fraction_bits=0):
-    """Python integers, in units of 2^-23 LSB: half added, cut, limited."""
+    """The sum in Python integers, in units of 2^-23 LSB: half is added, the sum is cut and limited."""
     ambient, diffuse_color, specular_color, diffuse, specular = (
         np.asarray(x).astype(object) for x in (ambient, diffuse_color, specular_color, diffuse, specular)
     )
@@ -46,11 +46,11 @@ def test_is_exact_to_the_last_rounding(lights, brightness):
 
 
 def test_halves_round_up():
-    """A half LSB, and the code below it, about every channel value."""
+    """About every channel value, half an LSB and the code below it are tried."""
     channel = np.arange(255)
     ambient = channel * 64
     for specular, expected in ((2**15, channel + 1), (2**15 - 1, channel)):
-        # 2^15 of 2^17 times 2 LSB is a half.
+        # 2^15 of 2^17 times 2 LSB is half an LSB.
         results = [
             compute(np.full(3, a), np.zeros((1, 3), int), np.full((1, 3), 128), [[0]], [[specular]])
             for a in ambient.tolist()
@@ -59,7 +59,10 @@ def test_halves_round_up():
 
 
 def test_stiff_sums_of_the_largest_and_smallest_codes():
-    """The largest codes of every word: 255, and no wrap; the same of one light eight times too bright."""
+    """The largest codes of every word give 255 and do not wrap.
+
+    A single light that is eight times too bright gives the same.
+    """
     color, term = COLOR.max_code, TERM.max_code
     for lights in (1, 16):
         colors, terms = np.full((lights, 3), color), np.full((4, lights), term)
@@ -72,7 +75,7 @@ def test_stiff_sums_of_the_largest_and_smallest_codes():
 
 
 def test_ambient_only():
-    """Every intensity of 255 channels, half-way values too, with black lights and bright terms."""
+    """Every intensity of 255 channels is tried, also half-way values, with black lights and bright terms."""
     intensity = np.linspace(0, 8, 4001)
     codes = Intensity.color(intensity)
     terms = np.full((1, 16), TERM.max_code)
@@ -84,7 +87,7 @@ def test_ambient_only():
 
 
 def test_stiff_coefficients_that_add_up_to_more_than_one():
-    """k_a + k_d + k_s = 1.2: the full channel where all terms are 1, unchanged where they are small."""
+    """k_a + k_d + k_s = 1.2 gives the full channel if all terms are 1. Small terms do not change."""
     ambient, diffuse, specular = (Intensity.color(np.full(3, k)) for k in (0.1, 0.6, 0.5))
     terms = np.array([[TERM.max_code], [2**16], [0]])
     result = compute(ambient, diffuse[np.newaxis], specular[np.newaxis], terms, terms)
@@ -124,18 +127,19 @@ def test_bad_arguments_are_refused():
 
 
 def test_clocks_of_the_compact_style():
-    """Three for each term that is not 0, three for a pixel without any; by hand."""
+    """Cycles counted by hand: three for each term that is not 0, and three for a pixel without terms."""
     diffuse = Fixed(TERM, [[0, 0], [0, 0], [1, 0], [1, 0], [7, TERM.max_code], [0, 0]])
     specular = Fixed(TERM, [[0, 0], [0, 5], [0, 0], [1, 0], [3, TERM.max_code], [2, 2]])
     assert Intensity().cycles(diffuse, specular).tolist() == [3, 3, 3, 6, 12, 6]
     assert Intensity(channels=1).cycles(diffuse, specular).tolist() == [1, 1, 1, 2, 4, 2]
 
 
-# Albedo.
+# These have an albedo.
 
 
 def exact_colored(operands, albedo, emission, tinted):
-    """Python integers: the light on the surface in 64ths of an LSB; the sum in units of 2^-23 LSB."""
+    """The pixel in Python integers: the light on the surface in 64ths of an LSB, the sum in units of 2^-23
+    LSB."""
     ambient, diffuse_color, specular_color, diffuse, specular, albedo, emission = (
         np.asarray(x).astype(object) for x in (*operands, albedo, emission)
     )
@@ -168,10 +172,10 @@ def any_operands(rng, lights, largest, pixels=2000):
 @pytest.mark.parametrize("tinted", [False, True])
 @pytest.mark.parametrize(("lights", "brightness"), [(0, 8.0), (1, 1.0), (2, 0.5), (16, 8.0)])
 def test_albedo_is_exact_to_both_roundings(lights, brightness, tinted):
-    """At 16 lights of 8 full channels the light on the surface reaches its limit."""
+    """With 16 lights of 8 full channels the light on the surface reaches its limit."""
     rng = np.random.default_rng([lights, tinted])
     operands = any_operands(rng, lights, int(brightness * 255 * 64))
-    # The light beside the albedo leaves room for that of the surface.
+    # The sum of the light beside the albedo still has room for the light of the surface.
     operands[2][...] >>= 8
     albedo = rng.integers(0, 1 << 16, (2000, 3), endpoint=True) >> rng.integers(0, 8, (2000, 1))
     emission = rng.integers(0, 64 * 64, 3)
@@ -182,7 +186,7 @@ def test_albedo_is_exact_to_both_roundings(lights, brightness, tinted):
 
 @pytest.mark.parametrize("tinted", [False, True])
 def test_error_of_a_colored_pixel(tinted):
-    """Against float64: half an LSB, and 2^-7 LSB of the light on the surface."""
+    """The error against float64 is at most half an LSB, and 2^-7 LSB of the light on the surface."""
     rng = np.random.default_rng(5)
     operands = any_operands(rng, 2, 40 * 64, 20_000)
     albedo, emission = rng.integers(0, 1 << 16, (20_000, 3), endpoint=True), rng.integers(0, 20 * 64, 3)
@@ -195,7 +199,7 @@ def test_error_of_a_colored_pixel(tinted):
 
 
 def test_white_albedo_changes_a_rounding_only():
-    """Of a white surface the sum is that of a unit without albedo, rounded to 2^-6 LSB before."""
+    """With a white albedo the sum is that of a unit without albedo, rounded to 2^-6 LSB beforehand."""
     rng = np.random.default_rng(6)
     operands = any_operands(rng, 1, 120 * 64)
     found = colored(operands, np.full((2000, 3), 1 << 16), np.zeros(3, int))
@@ -205,7 +209,8 @@ def test_white_albedo_changes_a_rounding_only():
 
 
 def test_cycles_of_the_compact_style_with_albedo():
-    """A cycle a channel for the albedo and each term; two for the sum of a single channel; by hand."""
+    """Cycles counted by hand: one a channel for the albedo and each term, two for the sum of a single
+    channel."""
     diffuse = Fixed(TERM, [[0, 0], [0, 0], [1, 0], [1, 0], [7, TERM.max_code], [0, 0]])
     specular = Fixed(TERM, [[0, 0], [0, 5], [0, 0], [1, 0], [3, TERM.max_code], [2, 2]])
     assert Intensity(2, has_albedo=True).cycles(diffuse, specular).tolist() == [3, 6, 6, 9, 15, 9]

@@ -1,4 +1,5 @@
-"""Lobe unit's bit-accurate model against float64: every argument, every address, monotone, the gate's end."""
+"""Lobe unit's bit-accurate model against float64: every argument, every address, monotone terms, the end of
+light."""
 
 import itertools
 from dataclasses import replace
@@ -46,7 +47,7 @@ def shade(lobe, codes, table, dark=False):
 
 
 def some_codes(lobe, rng, count=20_000):
-    """Codes of u under 1: the ends of every step, and others, as many in each octave."""
+    """Codes of u under 1: the ends of every step, and random codes, as many in each octave."""
     one = 1 << lobe.fraction_bits
     knots = np.ldexp(lobe.knots, lobe.fraction_bits).astype(np.int64)
     others = (one * 2.0 ** -rng.uniform(0, lobe.fraction_bits, count)).astype(np.int64)
@@ -56,14 +57,14 @@ def some_codes(lobe, rng, count=20_000):
 @pytest.mark.long
 @pytest.mark.parametrize(("octaves", "steps"), [(20, 16), (3, 256), *SIZES[:6], *SIZES[-1:]])
 def test_address_of_every_argument(octaves, steps):
-    """From the definition: the entry at or before u, and the share of the way to the next one, cut."""
+    """By the definition: the last entry at or before u, and the cut share of the way to the next entry."""
     lobe = Lobe(operand=CHORD, octaves=octaves, steps=steps)
     assert lobe.entries == (octaves + 1) * steps == len(lobe.knots) - 1
     knots = np.ldexp(lobe.knots, 25)
     assert (knots == np.rint(knots)).all()
     assert knots[0] == 0
     assert knots[-1] == 1 << 25
-    # Relative distances between 1/(2M) and 1/M, but in row 0.
+    # Relative distances are between 1/(2M) and 1/M, except in row 0.
     distance = np.diff(knots)
     assert (distance[steps:] <= knots[steps:-1] / steps).all()
     assert (distance[steps:] > knots[steps:-1] / (2 * steps)).all()
@@ -90,7 +91,7 @@ def test_address_with_other_fraction_bits(fraction_bits):
 
 @pytest.mark.parametrize(("octaves", "steps"), SIZES)
 def test_falls_at_every_address(octaves, steps):
-    """Every entry is at most the one before; the last term of a word is not under the next entry."""
+    """Every entry is at most the entry before. The last term of a word is not under the next entry."""
     for (model, parameter), cutoff in itertools.product(FALLING, (0, 2.0**-14, 0.01)):
         lobe = Lobe(model, CHORD, octaves, steps, cutoff=cutoff)
         table = lobe.table(parameter)
@@ -108,7 +109,10 @@ def test_falls_at_every_address(octaves, steps):
     ("model", "parameter"), [(BLINN, 10), (BLINN, 1000), (BECKMANN, 0.3), (GGX, 0.05), (GGX, 0.9)]
 )
 def test_every_argument(model, parameter):
-    """Falls with u over all 2^25 of them, and is off by at most a step of 2^-17 more than samples are."""
+    """Terms fall over all 2^25 values of u.
+
+    Their errors exceed those of samples by at most a step of 2^-17.
+    """
     lobe = replace(LOBE, reflection=model)
     table, before, worst = lobe.table(parameter), 1 << 17, 0.0
     for codes in pieces():
@@ -127,7 +131,8 @@ def test_every_argument(model, parameter):
 )
 @pytest.mark.parametrize(("octaves", "steps", "fraction_bits"), [(20, 16, 25), (12, 32, 25), (20, 16, 30)])
 def test_arithmetic_error(model, parameter, octaves, steps, fraction_bits):
-    """Against straight lines between the table's entries, and those against entries that are not rounded."""
+    """The model is compared with straight lines between the table's entries, and these with lines between
+    entries that are not rounded."""
     lobe = Lobe(model, CHORD, octaves, steps, fraction_bits=fraction_bits)
     table = lobe.table(parameter)
     codes = some_codes(lobe, np.random.default_rng(1))
@@ -139,7 +144,8 @@ def test_arithmetic_error(model, parameter, octaves, steps, fraction_bits):
     assert np.abs(off).max() + 2.0**-17 <= Lobe.ERROR
 
 
-# LSB, at most: for the first four sizes what float64 has with entries on the curve, rounded to 16 bits.
+# Largest errors in LSB. The first four sizes have those of float64 with entries on the curve, rounded to 16
+# bits.
 BOUNDS = {
     (8, 16): (
         (0.005, 0.07, 0.07, 0.06, 1.68),
@@ -179,7 +185,8 @@ def test_errors_by_size_and_lobe(size):
 
 
 def test_moved_entries_halve_the_error():
-    """Against entries on the curve, for which the error is that of lines: C / (8 M^2)."""
+    """Moved entries are compared with entries on the curve, which have the error of the lines, C / (8
+    M^2)."""
     for case, largest in zip(CASES[::2], (4 * np.exp(-2), 3 / 8), strict=True):
         for value in (100, 1000) if case.reflection is BLINN else (0.01, 0.1):
             lobe, parameter = replace(LOBE, reflection=case.reflection), case.parameter(value)
@@ -192,7 +199,7 @@ def test_moved_entries_halve_the_error():
 
 
 def test_error_at_every_exponent():
-    """At most 0.05 LSB, at n = 2, and 0.04 from 5 on."""
+    """The error is at most 0.05 LSB, at n = 2, and at most 0.04 LSB from n = 5 on."""
     errors = np.array([largest_error(LOBE, exponent, 16) for exponent in range(1, 1001)])
     assert np.argmax(errors) == 1
     assert errors[1] <= 0.05
@@ -200,7 +207,7 @@ def test_error_at_every_exponent():
 
 
 def test_error_of_coplanar_phong_at_every_exponent():
-    """With the size that `LOBES` gives it: a step begins beside the kink of exponent 1."""
+    """With the size that `LOBES` gives it, a step begins beside the kink of exponent 1."""
     lobe = replace(LOBES["phong_coplanar"], operand=CHORD)
     assert max(largest_error(lobe, exponent, 16) for exponent in range(1, 1001, 3)) <= 0.06
 
@@ -211,7 +218,8 @@ def test_error_of_ggx_at_every_roughness():
 
 
 def test_cosine_operand():
-    """Off from the same u by the step of the argument and 2^-16 of it, times the slope."""
+    """The term differs from that of the same u by the step of the argument and 2^-16 of u, times the
+    slope."""
     for model, parameter, slope in ((BLINN, 1, 1), (BLINN, 100, 100), (BLINN, 1000, 1000), (GGX, 0.3, 494)):
         lobe = Lobe(model)
         table = lobe.table(parameter)
@@ -221,7 +229,7 @@ def test_cosine_operand():
         terms = shade(lobe, codes, table)
         chord = 255 * Lobe.ERROR + largest_error(replace(lobe, operand=CHORD), parameter)
         bound = chord / 255 + slope * 2.0**-25 + 0.4 * 2.0**-16
-        # The last half step of 2^-16: u in units of `ONE_SQUARED` never reaches 1 there.
+        # The last half step of 2^-16 is missing, because u in units of `ONE_SQUARED` never reaches 1.
         front = codes > 0
         assert np.abs(terms.values - exact)[front].max() <= bound
         order = np.argsort(codes)
@@ -231,7 +239,7 @@ def test_cosine_operand():
 @pytest.mark.parametrize("operand", ["cosine", CHORD])
 @pytest.mark.parametrize("model", [FULL, TENT, BLINN])
 def test_out_of_range(operand, model):
-    """0 from u = 1 on and for dark beats; a negative u counts as 0."""
+    """The term is 0 from u = 1 on and for dark beats. A negative u counts as 0."""
     lobe = Lobe(model, operand)
     table, format, one = lobe.table(1), lobe.operand_format, ONE_SQUARED.codes.item()
     beyond = [format.max_code, format.max_code - 1, 1 << 25, (1 << 25) + 1]
@@ -249,7 +257,7 @@ def test_out_of_range(operand, model):
 
 
 def test_entry_of_one():
-    """A curve that is 1 everywhere is ``1 - 2^-17``, up to the end, and 0 from there on."""
+    """A curve that is 1 everywhere gives ``1 - 2^-17`` up to its end, and 0 from there on."""
     table = replace(LOBE, reflection=FULL).table()
     assert (shade(LOBE, [0, 1, 1 << 24, (1 << 25) - 1], table).codes == 2**17 - 1).all()
     assert shade(LOBE, 1 << 25, table).codes == 0
@@ -259,7 +267,7 @@ def test_rises_where_the_curve_rises():
     lobe = replace(LOBE, reflection=RISING)
     terms = shade(lobe, some_codes(lobe, np.random.default_rng(2)), lobe.table()).codes
     assert (np.diff(terms) >= 0).all()
-    # Of a curve of both kinds: no term of a word is outside of its two entries.
+    # For a curve of both kinds no term of a word is outside of its two entries.
     lobe = replace(LOBE, reflection=TENT)
     table, codes = lobe.table(), some_codes(lobe, np.random.default_rng(3))
     entry, _ = lobe.address(Fixed(UQ(1, 25), codes))
@@ -270,7 +278,7 @@ def test_rises_where_the_curve_rises():
 
 
 def test_steps_and_kinks_do_not_move_their_neighbours():
-    """Of a curve that jumps, or bends, at one place, the rest of the table is the curve."""
+    """If a curve jumps, or bends, at a place, the rest of the table still follows the curve."""
     for model in (STEP, TENT):
         lobe = replace(LOBE, reflection=model)
         off = np.abs(lobe.table().values.values - model.reflect(1 - np.minimum(lobe.knots, 1 - 2.0**-40)))
@@ -285,7 +293,7 @@ def test_steps_and_kinks_do_not_move_their_neighbours():
     ("model", "parameter"), [*FALLING[:-1:2], (RISING, None), (TENT, None), (STEP, None), (DARK, None)]
 )
 def test_last_lit_argument(model, parameter, cutoff, lobe):
-    """Exact: its term is over 0, and that of every larger argument 0."""
+    """The last lit argument is exact: its term is over 0, and the terms of all larger arguments are 0."""
     lobe = replace(lobe, reflection=model, cutoff=cutoff)
     table = lobe.table(parameter)
     last = table.last_lit_argument
@@ -300,7 +308,7 @@ def test_last_lit_argument(model, parameter, cutoff, lobe):
 
 @pytest.mark.parametrize("fraction_bits", [20, 22, 28, 34])
 def test_last_lit_argument_with_other_fraction_bits(fraction_bits):
-    """In steps of 2^-25: the next such step has no term, this one has."""
+    """In steps of 2^-25, this argument has a term and the next argument has none."""
     for exponent in (3, 77, 1000):
         lobe = Lobe(BLINN, CHORD, 15, 16, fraction_bits=fraction_bits)
         table = lobe.table(exponent)
@@ -313,7 +321,7 @@ def test_last_lit_argument_with_other_fraction_bits(fraction_bits):
 
 
 def test_last_lit_arguments_by_exponent():
-    """As those of the power by products, which ends at 2^-17; here half of it rounds up."""
+    """They are those of the power by products, which ends at 2^-17. Here half of 2^-17 is rounded up."""
     arguments = LOBE.last_lit_arguments
     assert arguments.shape == (1024,)
     assert (np.diff(arguments[1:]) <= 0).all()
@@ -329,7 +337,7 @@ def test_last_lit_arguments_by_exponent():
 
 
 def test_long_tails_end_where_they_are_cut():
-    """From alpha = 0.044 on ggx is over 0 up to a right angle; a cutoff of half an LSB ends it before."""
+    """From alpha = 0.044 on ggx is over 0 up to a right angle. A cutoff of half an LSB ends it earlier."""
     right_angle = (1 << 25) - 1
     for alpha, reaches in ((0.04, False), (0.045, True), (0.3, True)):
         lobe = replace(LOBE, reflection=GGX)

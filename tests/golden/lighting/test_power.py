@@ -22,7 +22,7 @@ def shade(unit, codes, exponent):
 
 
 def exact(argument, exponent):
-    """``(1 - x)^n`` with the digits of x."""
+    """``(1 - x)^n`` with all digits of x."""
     return np.exp(exponent * np.log1p(-np.minimum(argument, 1 - 1e-15)))
 
 
@@ -39,7 +39,8 @@ def test_error_at_every_exponent():
         codes = np.sort(np.floor(argument * 2**25).astype(np.int64))
         result = shade(unit, np.minimum(codes, unit.operand_format.max_code), exponent)
         error = result.values - exact(codes * 2.0**-25, exponent)
-        # The cuts of neighbours differ, by less than the bound; of any two, `tests/formal/test_power.py`.
+        # The cuts of neighbours differ by less than the bound. `tests/formal/test_power.py` has any two
+        # arguments.
         assert (np.diff(result.codes) <= 5).all()
         largest, smallest = max(largest, error.max()), min(smallest, error.min())
     # Every cut makes the result smaller.
@@ -48,7 +49,7 @@ def test_error_at_every_exponent():
 
 
 def test_error_of_a_cosine():
-    """In units of the codes' length, ``x / omega`` exceeds x by a share of 2^-16; n x c^(n-1) <= 1."""
+    """In units of the codes' length omega, ``x / omega`` exceeds x by a share of 2^-16; n x c^(n-1) <= 1."""
     unit = Power()
     omega = ONE_SQUARED.codes.item()
     for exponent in (1, 2, 3, 10, 100, 500, 1000):
@@ -58,7 +59,8 @@ def test_error_of_a_cosine():
 
 
 def test_first_order_bound():
-    """The sum of docs/theory/bounds.md#power: every cut product's error times its way to the result."""
+    """The sum of docs/theory/bounds.md#power: the error of every cut product, times its factor in the
+    result."""
     worst, at = 0, None
     for n in range(1, 1001):
         bits = [j for j in range(10) if n >> j & 1]
@@ -67,7 +69,7 @@ def test_first_order_bound():
             x.append(2 * x[-1] - x[-1] ** 2)
         total = np.ones_like(x[0])
         for k in range(9):
-            # A square's error of 2 x reaches all higher bits: c^m with m = n >> (k + 1).
+            # The error 2 x of a square reaches all higher bits: c^m with m = n >> (k + 1).
             m = n >> (k + 1)
             if m:
                 lower = np.prod([1 - x[j] for j in bits if j <= k], axis=0)
@@ -85,7 +87,7 @@ def test_first_order_bound():
 
 
 def test_against_integers():
-    """Exact rational powers, nothing of floating point."""
+    """Powers in exact rational numbers, without floating point."""
     unit = Power("one_minus_cosine")
     rng = np.random.default_rng(3)
     for exponent in (1, 2, 7, 63, 513, 1000):
@@ -97,11 +99,11 @@ def test_against_integers():
 
 @pytest.mark.parametrize("exponent", EXPONENTS)
 def test_stiff_codes(exponent):
-    """The peak and past it, c of 0 and below; the other corner cases are those of `test_specular`."""
+    """The peak and cosines past it, and cosines of 0 and less. `test_specular` has the other limits."""
     unit, one = Power(), ONE_SQUARED.codes.item()
     assert (shade(unit, [one, one + 2**20, unit.operand_format.max_code], exponent).codes == 2**17 - 1).all()
     assert not shade(unit, [-(2**18), -one, unit.operand_format.min_code], exponent).codes.any()
-    # A square of the codes' length is 2^-16 short of 1, so that c = 0 is read as 2^-16.
+    # The square of the codes' length is 2^-16 less than 1, so c = 0 counts as 2^-16.
     assert (shade(unit, [0, -1], exponent).codes == (exponent == 1)).all()
     unit = Power("one_minus_cosine")
     assert shade(unit, [0], exponent).codes == 2**17 - 1

@@ -1,4 +1,5 @@
-"""Lobes of the quotient method against float64, over both parts of their tables; dark, ends, and refusals."""
+"""Lobes of the quotient method against float64, over both parts of their tables; dark beats, ends, and
+refusals."""
 
 import numpy as np
 import pytest
@@ -9,11 +10,11 @@ from blysk.golden.reference.lobes import BECKMANN, GGX
 from blysk.golden.reference.reflection import BLINN, PHONG, REFLECTION_MODELS
 
 SPACING = 61
-"""Codes from a place to the next: odd, so that all positions within a step occur."""
+"""Codes from one place to the next. The number is odd, so that all positions within a step occur."""
 
 
 def places(lobe):
-    """Codes of places where s, or 1 - s, is up to 1/2; the cosine of each, in the middle of its code."""
+    """Codes of places where s, or 1 - s, is up to 1/2, and the cosine in the middle of each code."""
     inside = (lobe.octaves * lobe.steps) << 12
     codes = np.r_[np.arange(0, inside, SPACING), inside - 1]
     s = np.interp((codes + 0.5) / 4096, np.arange(len(lobe.knots)), lobe.knots)
@@ -39,7 +40,8 @@ def shade(lobe, codes, table, dark=False):
     ids=lambda value: getattr(value, "name", None),
 )
 def test_error_of_the_lines(model, parameters, lsb):
-    """Largest error over both parts is within what the docstring of `QuotientLobe` states, in LSB."""
+    """The largest error over both parts is within the statement of the docstring of `QuotientLobe`, in
+    LSB."""
     lobe = QuotientLobe(model)
     codes, cosine = places(lobe)
     for parameter in parameters:
@@ -56,7 +58,7 @@ def test_sharp_lobes_lose_their_error():
 
 
 def test_phong_ends_in_a_kink_at_a_half():
-    """At power 1 the line into ``s = 1/2`` ends at 0 exactly, and all places behind are dark."""
+    """At power 1 the line up to ``s = 1/2`` ends at exactly 0, and all places beyond are dark."""
     lobe = QuotientLobe(PHONG)
     table, end = lobe.table(1), (lobe.octaves * lobe.steps) << 12
     last = shade(lobe, np.array([end - 4096, end - 2048, end - 1]), table).values * 255

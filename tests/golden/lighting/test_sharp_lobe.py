@@ -1,4 +1,4 @@
-"""Lobes that are too sharp for the words of u: scale; steps for the others."""
+"""Lobes that are too sharp for the words of u: their scale, and the steps of other lobes."""
 
 from dataclasses import replace
 
@@ -23,7 +23,7 @@ GGX, BECKMANN = (replace(LOBES[name], operand="one_minus_cosine") for name in ("
 
 @pytest.mark.parametrize("scale", [0, 3, 6])
 def test_scaled_values(scale):
-    """``min(2^s u, 1)``, exact but for half a step; without a scale up to 2."""
+    """The words are ``min(2^s u, 1)``, exact except for half a step. Without a scale they go up to 2."""
     values = np.r_[1e-4, 0.02, 2, np.random.default_rng(2).uniform(0, 2, 500)]
     given = SpanValues.quantise(np.zeros((1, 1, len(values))), values[np.newaxis, np.newaxis], scale)
     scaled = np.minimum(values * 2**scale, 1 if scale else 2) * float(ONE_SQUARED.values)
@@ -32,7 +32,7 @@ def test_scaled_values(scale):
 
 
 def test_scale_of_lobes():
-    """The largest that all are dark at; none where none is sharp, or one is as wide as it is sharp."""
+    """The scale is the largest that all lobes allow. It is 0 if no lobe is sharp, or if one lobe is wide."""
     assert GGX.scale_of([0.05]) == GGX.scale_of([0.05, 0.06]) == 6
     assert GGX.scale_of([0.1, 0.05]) == 4
     assert GGX.scale_of([0.3]) == GGX.scale_of([0.05, 0.5]) == 0
@@ -43,7 +43,7 @@ def test_scale_of_lobes():
 
 
 def test_scaled_table():
-    """Entries of ``S(2^-s u)``, within what lines and rounding take."""
+    """Entries of ``S(2^-s u)`` are within the errors of lines and rounding."""
     lobe = replace(GGX, scale=6)
     u = np.random.default_rng(4).uniform(0, 1, 4000) ** 4
     format = lobe.argument_format
@@ -54,7 +54,10 @@ def test_scaled_table():
 
 
 def test_steps_for_lobes():
-    """Beckmann's with a steep end gets finer steps, and then is off by a seventh of an LSB; others stay."""
+    """Beckmann's lobe with a steep end gets finer steps, and is then off by 0.14 LSB.
+
+    Other lobes keep their steps.
+    """
     finer = BECKMANN.for_parameters([0.3, 1.0])
     assert (finer.octaves, finer.steps) == Lobe.FINER
     assert finer.entries <= 512
@@ -67,7 +70,10 @@ def test_steps_for_lobes():
 
 @pytest.mark.parametrize(("model", "roughness"), [("ggx", 0.05), ("beckmann", 1.0)])
 def test_frames(model, roughness):
-    """Under 3/4 of an LSB, from lights that give highlights of a few pixels; without that it is not."""
+    """Lights that give highlights of a few pixels have errors under 3/4 of an LSB.
+
+    Without the scale they have larger errors.
+    """
     mesh = teapot(1000)
     coefficients = (0.05,) * 3, (0.4, 0.3, 0.2), (0.55, 0.5, 0.6)
     material = Material(*coefficients, 50, roughness)

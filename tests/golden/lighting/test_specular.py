@@ -1,4 +1,4 @@
-"""Model of the specular unit against float64: every model and exponent, every argument of some."""
+"""Model of the specular unit against float64: every model and exponent, and every argument of some."""
 
 import math
 from fractions import Fraction
@@ -19,9 +19,9 @@ MODELS = SPECULAR_MODELS + FURTHER_MODELS
 EVERY_EXPONENT = np.arange(1, MAX_EXPONENT + 1)
 EXPONENTS = (1, 2, 3, 10, 100, 500, 1000)
 QUICK = [n if n in (1, 1000) else pytest.param(n, marks=pytest.mark.long) for n in EXPONENTS]
-# One minus cosine has 26 bits; up to the base's zero at 1/k there are 2^18 of them or fewer from k = 128 on.
+# One minus cosine has 26 bits. From k = 128 on, at most 2^18 codes lie before the base's zero at 1/k.
 EXHAUSTIVE = (300, 500, 511, 512, 513, 777, 1000)
-# Largest error measured over every exponent, by squarings; 6.1e-5 is the cutoff itself.
+# Largest error measured at every exponent, by the number of squarings. 6.1e-5 is the error of the cutoff.
 MEASURED = {1: 6.2e-5, 2: 6.2e-5, 3: 1.3e-4, 0: 1.8e-4}
 MEASURED_OF_COSCOS = {1: 8.4e-5, 2: 1.7e-4}
 
@@ -32,12 +32,12 @@ def shade(unit, codes, exponent, dark=False):
 
 
 def exact(model, exponent, argument):
-    """``max(1 - k (1 - c), 0)^2``, of one minus the cosine: nothing cancels near the peak."""
+    """``max(1 - k (1 - c), 0)^2``, computed from one minus the cosine, so no digits cancel near the peak."""
     return np.maximum(1 - model.slope(exponent) * argument, 0) ** 2
 
 
 def zero(unit, exponent):
-    """Argument at which the unit's cutoff lies, nearly."""
+    """The argument at which the unit's cutoff lies, nearly."""
     if unit.name == "exp":
         return 14 * np.log(2) / exponent
     if unit.is_coscos:
@@ -47,11 +47,11 @@ def zero(unit, exponent):
 
 
 def cell_ends(unit, exponent):
-    """The first and last argument of every value of what the unit reads of it, up to past the base's zero.
+    """The first and the last argument of every value that the unit reads, up to just past the base's zero.
 
-    The result depends on the shifted word alone, that of ``coscos`` also on the argument without its last 8
-    bits. The exact function falls with the argument, so that the errors of all arguments lie between those
-    at the ends.
+    The result depends on the shifted word alone; for ``coscos`` also on the argument without its last 8 bits.
+    The exact function falls as the argument rises. So the errors of all arguments lie between the errors at
+    these ends.
     """
     _, shift = unit.scale(np.int64(exponent))
     dropped = min(9 - int(shift), 8 if unit.is_coscos else 10)
@@ -61,14 +61,14 @@ def cell_ends(unit, exponent):
 
 
 def check(unit, exponent, codes):
-    """Largest error, and largest error of what is not cut off."""
+    """Largest error, and largest error of the terms that are not cut off."""
     result = shade(unit, codes, exponent).values
     ideal = exact(unit.reflection, exponent, codes * 2.0**-25)
     error = np.abs(result - ideal)
     assert error.max() <= Specular.ERROR
     dropped = result == 0
     assert ideal[dropped].max(initial=0) <= Specular.CUTOFF**2
-    # Nothing else is: past the base's reading error a brighter term shows.
+    # No other term is cut off: beyond the reading error of the base a brighter term shows.
     assert ideal[~dropped].min() > (Specular.CUTOFF - 2.0**-14) ** 2
     return error.max(), error[~dropped].max()
 
@@ -76,7 +76,8 @@ def check(unit, exponent, codes):
 @pytest.mark.parametrize("model", SPECULAR_MODELS)
 @pytest.mark.parametrize("exponent", EXHAUSTIVE)
 def test_error_of_every_argument(model, exponent):
-    """Measured: 6.1e-5, half of the bound, where it is cut off; 2.9e-5, a quarter of it, elsewhere."""
+    """Measured: 6.1e-5, half of the bound, where the term is cut off; 2.9e-5, a quarter of the bound,
+    elsewhere."""
     unit = Specular(REFLECTION_MODELS[model], "one_minus_cosine")
     last = int(2**25 / REFLECTION_MODELS[model].slope(exponent)) + 100
     assert last < 2**18 + 100
@@ -106,7 +107,7 @@ def test_error_of_every_argument_of_a_wide_highlight(model, exponent):
     ideal = REFLECTION_MODELS[model].reflect(1 - codes * 2.0**-25, exponent)
     assert np.abs(result.values - ideal).max() <= unit.error
     assert (np.diff(result.codes) <= 0).all()
-    # The base is read too small by a chord's 8.5e-6 and a cut of 2^-17, and dropped there.
+    # The base is read too small by a chord's 8.5e-6 and a cut of 2^-17, and is dropped there.
     assert ideal[result.codes == 0].max() <= (unit.cutoff.values + 2.0**-15) ** COSCOS_MODELS[model][0]
 
 
@@ -116,7 +117,7 @@ def test_error_of_every_argument_of_a_wide_highlight(model, exponent):
 )
 @pytest.mark.parametrize("model", MODELS)
 def test_error_and_monotony_at_every_exponent(model, operand, step):
-    """Of a cosine of two unit vectors too: read in units of their length, it is off by no more."""
+    """For a cosine of two unit vectors, read in units of their length, the error is not larger."""
     unit = Specular(REFLECTION_MODELS[model], operand)
     worst = 0
     for exponent in EVERY_EXPONENT[::step]:
@@ -139,7 +140,7 @@ def test_error_and_monotony_at_every_exponent(model, operand, step):
         ideal = REFLECTION_MODELS[model].reflect(1 - argument, exponent)
         worst = max(worst, np.abs(result.values - ideal).max())
         assert (np.diff(result.codes) <= 0).all()
-        # What is dropped is under 2^-14, but for the error with which the argument is read.
+        # A dropped term is under 2^-14, except for the error with which the argument is read.
         assert ideal[result.codes == 0].max(initial=0) <= 2.0**-14 * 1.001
     measured = (MEASURED_OF_COSCOS if unit.is_coscos else MEASURED)[unit.squarings]
     assert unit.error / 10 < worst <= min(unit.error, measured)
@@ -147,7 +148,8 @@ def test_error_and_monotony_at_every_exponent(model, operand, step):
 
 @pytest.mark.parametrize("model", COSCOS_MODELS)
 def test_first_order_bound_of_coscos(model):
-    """The sum of docs/theory/bounds.md#specular-terms, up to x = 1.7: every cut times the fall with w."""
+    """The sum of docs/theory/bounds.md#specular-terms, up to x = 1.7: every cut, times the slope of the term
+    in w."""
     unit, (power, rule) = Specular(REFLECTION_MODELS[model]), COSCOS_MODELS[model]
     worst = 0
     for exponent in (*range(1, 33), *range(33, 1001, 31), 1000):
@@ -170,10 +172,11 @@ def test_first_order_bound_of_coscos(model):
 
 @pytest.mark.parametrize("model", COSCOS_MODELS)
 def test_boundaries_of_coscos(model):
-    """The cosine at the last lit argument, and one step of the shifted word on, is the cutoff to 2^-14.
+    """At the last lit argument, and one step of the shifted word further, the cosine is the cutoff to 2^-14.
 
     The base is read too high by at most 4.3e-5 there, the sum of docs/theory/bounds.md#specular-terms with a
-    slope of pi/4. A step is up to 1.2e-5 of it. The lobe of n = 1 is left out: there the chords of e fail.
+    slope of pi/4. A step is up to 1.2e-5 of it. The lobe of n = 1 is left out, because the chords of e fail
+    there.
     """
     unit, exponents = Specular(REFLECTION_MODELS[model]), EVERY_EXPONENT[1:]
     scale = np.array([coscos_scale(n, *COSCOS_MODELS[model]) for n in exponents.tolist()])
@@ -186,7 +189,7 @@ def test_boundaries_of_coscos(model):
 
 
 def test_curves_of_coscos():
-    """Both tables at every code, against their functions."""
+    """Both tables are compared with their functions at every code."""
     unit = Specular(REFLECTION_MODELS["coscos2"])
     w = np.arange(2**17)
     error = unit.chords.compute(w).values - np.cos(np.pi / 2 * np.sqrt(w * 2.0**-17))
@@ -201,19 +204,20 @@ def test_curves_of_coscos():
 
 
 def test_slopes_of_coscos():
-    """By Taylor's rule a line, by equal integrals a table."""
+    """By Taylor's rule the slope is a line, by equal integrals a table."""
     for model, (power, rule) in COSCOS_MODELS.items():
         unit = Specular(REFLECTION_MODELS[model])
         assert (unit.slope_terms is None) == (rule == "integral")
         ideal = [8 * (coscos_scale(n, power, rule) / np.pi) ** 2 for n in EVERY_EXPONENT.tolist()]
-        # As in test_slope: a n + b off by n 2^-20 and 2^-18; a table by 2^-19.
+        # As in test_slope: a n + b is off by n 2^-20 and 2^-18, and a table by 2^-19.
         bound = 2.0**-19 if rule == "integral" else EVERY_EXPONENT * 2.0**-20 + 2.0**-18
         assert (np.abs(unit.slopes.values[1:1001] - ideal) <= bound).all()
 
 
 @pytest.mark.parametrize("model", SPECULAR_MODELS)
 def test_slope(model):
-    """The hardware's ``K 2^s`` against the model's k: at most the cut of the sum and of K, 2^-17 each."""
+    """The hardware's ``K 2^s`` differs from the model's k by at most the cuts of the sum and of K, 2^-17
+    each."""
     unit = Specular(REFLECTION_MODELS[model])
     scale, shift = unit.scale(EVERY_EXPONENT)
     assert scale.codes.min() >= 2**16
@@ -221,7 +225,8 @@ def test_slope(model):
     assert (shift <= 9).all()
     ours = scale.values * 2.0**shift
     ideal = np.array([REFLECTION_MODELS[model].slope(exponent) for exponent in EVERY_EXPONENT])
-    # a n: a rounded to 2^-20; cut to 2^-18; b rounded to 2^-19; K cut, a relative 2^-16 of at least 1/2.
+    # For a n: a is rounded to 2^-20, the product is cut to 2^-18, b is rounded to 2^-19. K is cut, a relative
+    # 2^-16 of at least 1/2.
     bound = EVERY_EXPONENT * 2.0**-20 + 2.0**-18 + 2.0**-19 + ideal * 2.0**-16
     assert (np.abs(ours - ideal) <= bound).all()
     if model != "cosquad_lin":
@@ -230,7 +235,7 @@ def test_slope(model):
 
 @pytest.mark.parametrize("model", SPECULAR_MODELS)
 def test_boundaries_are_the_last_arguments_over_the_cutoff(model):
-    """Exact: the base at the boundary reaches 1/128, one step on it does not."""
+    """The boundary is exact: there the base reaches 1/128, and one step beyond it does not."""
     unit = Specular(REFLECTION_MODELS[model])
     scale, _ = unit.scale(EVERY_EXPONENT)
     for exponent, k in zip(EVERY_EXPONENT, scale.codes.tolist(), strict=True):
@@ -244,7 +249,7 @@ def test_boundaries_are_the_last_arguments_over_the_cutoff(model):
 
 
 def test_second_lobe_stays_dark():
-    """The parabola is 16 at n = 20, 60 degrees; nothing comes back up to the largest argument."""
+    """The parabola is 16 at n = 20 and 60 degrees. No light comes back up to the largest argument."""
     cosine = Specular(REFLECTION_MODELS["cosquad"], "cosine")
     code = np.rint(ONE_SQUARED.codes * 0.5).astype(np.int64)
     assert shade(cosine, code, 20).codes == 0
@@ -255,13 +260,16 @@ def test_second_lobe_stays_dark():
             beyond = everything[everything * 2.0**-25 > 1 / REFLECTION_MODELS[model].slope(exponent)]
             assert len(beyond) > 0 or REFLECTION_MODELS[model].slope(exponent) < 1
             assert not shade(unit, beyond, exponent).codes.any()
-    # Every code that a cosine can have, to those of no unit vector.
+    # Every code that a cosine can have is tried, also codes of vectors that are no unit vectors.
     ends = [cosine.operand_format.min_code, -ONE_SQUARED.codes.item(), -1, 0]
     assert not shade(cosine, ends, 4).codes.any()
 
 
 def test_published_comparator_lets_the_second_lobe_through():
-    """At n = 20, 60 degrees the square is 16: it saturates, and the surface is as bright as at the peak."""
+    """At n = 20 and 60 degrees the square is 16.
+
+    It saturates, and the surface is as bright as at the peak.
+    """
     published, gated = (Specular(as_published=as_published) for as_published in (True, False))
     code = np.rint(ONE_SQUARED.codes * 0.5).astype(np.int64)
     assert shade(published, code, 20).codes == 2**17 - 2
@@ -272,13 +280,16 @@ def test_published_comparator_lets_the_second_lobe_through():
     for degrees, bright in ((36, False), (37, True)):
         code = np.rint(ONE_SQUARED.codes * np.cos(np.radians(degrees))).astype(np.int64)
         assert (shade(published, code, 20).codes == 2**17 - 2) == bright
-    # Dark is dark in either.
+    # Dark beats are dark in both forms.
     assert shade(published, code, 20, dark=True).codes == 0
 
 
 @pytest.mark.parametrize("model", SPECULAR_MODELS)
 def test_published_comparator(model):
-    """Up to the base's zero to the bit the default; past it the parabola as published, limited to 1."""
+    """Up to the base's zero the published form equals the default to the bit.
+
+    Beyond it is the published parabola, limited to 1.
+    """
     published, gated = (
         Specular(REFLECTION_MODELS[model], "one_minus_cosine", published) for published in (True, False)
     )
@@ -306,7 +317,10 @@ def unit_of(model, operand="cosine"):
 @pytest.mark.parametrize("exponent", QUICK)
 @pytest.mark.parametrize("model", [*MODELS, "blinn"])
 def test_stiff_exponents(model, exponent):
-    """Over the whole half sphere, the bound; at the peak and past it by rounding, 1 to nine steps."""
+    """The bound holds over the whole half sphere.
+
+    At the peak, and past it by rounding, terms are 1 to nine steps.
+    """
     unit, bound = unit_of(model)
     one = ONE_SQUARED.codes.item()
     codes = np.unique(np.r_[np.linspace(0, one, 5000), one - np.geomspace(1, one, 5000)].astype(np.int64))
@@ -321,7 +335,7 @@ def test_stiff_exponents(model, exponent):
 @pytest.mark.parametrize("exponent", QUICK)
 @pytest.mark.parametrize("model", [*MODELS, "blinn"])
 def test_stiff_largest_and_smallest_codes(model, exponent):
-    """The far side of the sphere, and codes of no unit vector: the term of N·H = -1, and of 1."""
+    """The far side of the sphere, and codes of no unit vector, give the terms of N·H = -1 and of 1."""
     unit, bound = unit_of(model)
     one, format = ONE_SQUARED.codes.item(), unit.operand_format
     ends = shade(unit, [-one, format.min_code], exponent)
@@ -330,16 +344,18 @@ def test_stiff_largest_and_smallest_codes(model, exponent):
     argument = unit_of(model, "one_minus_cosine")[0]
     last = shade(argument, ARGUMENT.max_code, exponent)
     assert last.values == pytest.approx(REFLECTION_MODELS[model].reflect(-1.0, exponent), abs=bound)
-    # A light behind the surface, at the terminator, N·L = 0, too: nothing, whatever the cosine.
+    # A light behind the surface, or at the terminator with N·L = 0, gives nothing, whatever the cosine.
     codes = [format.min_code, -one, 0, one, format.max_code]
     assert not shade(unit, codes, exponent, dark=True).codes.any()
 
 
 @pytest.mark.parametrize("model", [*MODELS, "blinn"])
 def test_stiff_normals_of_wrong_length(model):
-    """N of length 1 +- 1/256 or 0, or no H: the term of that product, counted as 1 above 1; no more error.
+    """With N of length 1 +- 1/256 or 0, or without H, the term is that of the product, at most 1, without
+    another error.
 
-    At n = 1000 a normal too short by 1/256 has no highlight left: ``cosquad`` gives 0, Blinn's power 0.02.
+    At n = 1000 a normal that is 1/256 too short has no highlight left: ``cosquad`` gives 0, Blinn's power
+    0.02.
     """
     unit, bound = unit_of(model)
     rng = np.random.default_rng(5)
@@ -362,10 +378,12 @@ def test_stiff_normals_of_wrong_length(model):
 
 @pytest.mark.parametrize("model", [*MODELS, "blinn"])
 def test_stiff_peak_on_and_between_pixels(model):
-    """Pixels 1 degree apart, the peak on one or half-way: symmetric, the largest in the middle, and exact.
+    """With pixels 1 degree apart, and the peak on a pixel or half-way, terms are symmetric, largest in the
+    middle, and exact.
 
-    From n = 1000 on, the documents' highlights are 2.6 degrees across, three or four pixels. Narrower than a
-    pixel, at pixels 20 degrees apart, only a pixel at the peak is lit; between two nothing is seen.
+    From n = 1000 on, the documents' highlights are 2.6 degrees across, three or four pixels. With pixels 20
+    degrees apart a highlight is narrower than a pixel: only a pixel at the peak is lit, and none if the peak
+    is between two.
     """
     unit, bound = unit_of(model)
     for pitch in (1.0, 20.0):
@@ -379,12 +397,15 @@ def test_stiff_peak_on_and_between_pixels(model):
                 assert found.codes.max() == found.codes[middle]
                 ideal = REFLECTION_MODELS[model].reflect(np.cos(angle), exponent)
                 assert np.abs(found.values - ideal).max() <= bound + 2.0**-17
-            # Of the last exponent, 1000.
+            # The figures of the last exponent, 1000.
             assert found.codes.any() == (pitch == 1 or not offset)
 
 
 def test_chords_meet():
-    """No step from one chord to the next of more than half a code; the last ends where the curve does."""
+    """From one chord to the next there is no step of more than half a code.
+
+    The last chord ends where the curve does.
+    """
     unit = Specular(REFLECTION_MODELS["exp"])
     start, step = unit.chords.start, unit.chords.step
     assert start.codes - step.codes == pytest.approx(np.r_[start.codes[1:], start.codes[0] / 2], abs=0.5)
@@ -421,7 +442,7 @@ def test_bad_arguments_are_refused():
         Specular(REFLECTION_MODELS["exp"], as_published=True)
     with pytest.raises(ValueError, match=r"^operand must be 'cosine' or 'one_minus_cosine', not 'sine'$"):
         Specular(operand="sine")
-    # Each of these wrapped, or ended in an error without a name.
+    # Earlier, each of these wrapped, or ended in an error without a name.
     for options, message in (
         ({"a": 1.5}, r"a must be from 0 to 0\.999998, not 1\.5"),
         ({"a": 0.4, "b": -0.1}, r"b must be from 0 to 0\.999996, not -0\.1"),

@@ -11,7 +11,7 @@ INPUTS = np.arange(1 << 14)
 
 
 def exact(light):
-    """The curve, written here again: codes before rounding of light in LSB."""
+    """A second implementation of the curve: codes of light in LSB, before rounding."""
     share = np.minimum(np.asarray(light) / 255, 1)
     return 255 * np.where(share <= 0.0031308, 12.92 * share, 1.055 * share ** (1 / 2.4) - 0.055)
 
@@ -22,7 +22,10 @@ def codes():
 
 
 def test_every_input_is_correctly_rounded(codes):
-    """The table adds no error to the half of the rounding; ends, and no step down or of two codes."""
+    """The table adds no error to the half of the rounding.
+
+    Both ends are right, and no step falls or rises by two codes.
+    """
     error = np.abs(codes - exact(INPUTS / 64))
     assert 0.499 < error.max() <= 0.5
     assert (codes[0], codes[255 * 64], codes[-1]) == (0, 255, 255)
@@ -31,7 +34,8 @@ def test_every_input_is_correctly_rounded(codes):
 
 
 def test_a_dark_gradient_steps_by_one_code_at_most():
-    """From black to 10 LSB of light by 1/4096 LSB: the intensity unit keeps the bits that the curve needs."""
+    """From black to 10 LSB of light in steps of 1/4096 LSB, the intensity unit keeps the bits that the curve
+    needs."""
     light = np.arange(10 * 4096) * 2.0**-12
     unit = Intensity(1, fraction_bits=6)
     color = np.full((1, 3), 10 * 64)

@@ -1,4 +1,4 @@
-"""Scenes for tests of the renderer, and their rays and colors without any of its code."""
+"""Scenes for tests of the renderer, and their rays and colours, without any code of the renderer."""
 
 import math
 from dataclasses import replace
@@ -18,11 +18,11 @@ SEVERAL = (
     Material((0.3, 0, 0), (0.1, 0.9, 0.2), (0.8, 0, 0), 3),
     Material((0, 0, 0), (1,) * 3, (1,) * 3, 200),
 )
-"""Materials of one mesh."""
+"""Materials of a mesh."""
 
 
 def ball(segments=12, rings=7):
-    """An ellipsoid with its own normals, open at the poles, so that its inside is seen too."""
+    """An ellipsoid with its own normals. It is open at the poles, so that its inside is visible, too."""
     u, v = np.meshgrid(
         np.arange(segments) * 2 * np.pi / segments, np.linspace(0.5, np.pi - 0.3, rings), indexing="ij"
     )
@@ -32,7 +32,7 @@ def ball(segments=12, rings=7):
     faces = np.concatenate(
         (np.column_stack((first, second, second + 1)), np.column_stack((first, second + 1, first + 1)))
     )
-    # Outward anticlockwise.
+    # Seen from outside, corners go anticlockwise.
     return Mesh(unit * (1, 0.7, 1.2), faces[:, ::-1].copy(), normalise(unit / (1, 0.7, 1.2)))
 
 
@@ -61,10 +61,10 @@ SCENES = {
     "crossing in perspective": scene_of(
         soup(2), Camera((0.3, 0.2, 2.5), (0, 0, 0), projection="perspective", field_of_view=40)
     ),
-    # Triangles before, behind and across the near plane; some are seen from behind.
+    # Triangles in front of, behind and across the near plane. Some are seen from behind.
     "near plane": scene_of(soup(3), INSIDE),
     "near plane, many": scene_of(soup(4, 40), INSIDE),
-    # So near that corners project millions of pixels away.
+    # These are so near that their corners project millions of pixels away.
     "guard band": scene_of(soup(5, 40), replace(INSIDE, near=1e-7)),
     "orthographic near plane": scene_of(soup(6, 40), Camera((0, 0, 0.1), (0, 0, -1), height=2.0, near=0.2)),
 }
@@ -80,7 +80,8 @@ SCENES |= {
 
 
 def cast(scene, dx=0.0, dy=0.0):
-    """Ray through every pixel centre, moved by (dx, dy) pixels: nearest triangle or -1, and shares."""
+    """For the ray through every pixel centre, moved by (dx, dy) pixels: the nearest triangle or -1, and
+    shares."""
     camera = scene.camera
     forward = np.subtract(camera.target, camera.position)
     forward = forward / np.linalg.norm(forward)
@@ -97,7 +98,7 @@ def cast(scene, dx=0.0, dy=0.0):
         unit = camera.height / scene.height
         origin = camera.position + unit * (across[..., np.newaxis] * right + above[..., np.newaxis] * up)
         direction = np.broadcast_to(forward, (*column.shape, 3))
-    # origin + depth direction = a + s (b - a) + t (c - a), for every pixel and triangle.
+    # For every pixel and triangle, origin + depth direction = a + s (b - a) + t (c - a).
     a, b, c = np.moveaxis(scene.mesh.vertices[scene.mesh.faces], 1, 0)
     matrices = np.empty((*column.shape, len(a), 3, 3))
     matrices[..., 0] = b - a
@@ -114,7 +115,7 @@ def cast(scene, dx=0.0, dy=0.0):
 
 
 def color_by_hand(normals, viewer, shine=lambda cosine: np.maximum(cosine, 0) ** MATERIAL.exponent):
-    """Colors of unit normals under distant lights, saturated; no code of the project's lighting."""
+    """Colours of unit normals under distant lights, saturated, without code of the project's lighting."""
     normals, color = np.asarray(normals), np.array(MATERIAL.ambient)
     for light in LIGHTS:
         half = np.add(light.direction, viewer)

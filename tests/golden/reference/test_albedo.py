@@ -24,7 +24,7 @@ V = np.array([0.0, 0.0, 1.0])
 
 
 def painted(scene, *materials, colors=True):
-    """A scene with vertex colours and texture coordinates, and a material for every other face."""
+    """A scene with vertex colours and texture coordinates, and a material for every second face."""
     count = len(scene.mesh.vertices)
     mesh = replace(
         scene.mesh,
@@ -41,7 +41,7 @@ SCENE = painted(SCENES["crossing in perspective"], TEXTURED, replace(MATERIAL, t
 
 @pytest.mark.parametrize("tinted", [False, True])
 def test_sum(tinted):
-    """Each term by the formula, light by light."""
+    """Each term follows the formula, light by light."""
     material = replace(MATERIAL, tinted=tinted, emission=(0.1, 0.0, 0.3))
     normals, albedo = RNG.normal(size=(50, 3)), RNG.random((50, 3))
     normals /= np.linalg.norm(normals, axis=1, keepdims=True)
@@ -82,7 +82,7 @@ def test_unlit(albedo):
 
 
 def test_constants():
-    """Without albedo, emission and unlit surfaces are constants; the vectors of lights stay."""
+    """Without albedo, emission and unlit surfaces are constants, and the vectors of lights do not change."""
     scene = replace(SCENES["orthographic"], ambient_light=(0.5,) * 3)
     lit = FrameConstants.of(scene)
     glowing = FrameConstants.of(replace(scene, material=replace(MATERIAL, emission=(1.0, 0.0, 0.25))))
@@ -98,7 +98,7 @@ def test_constants():
 
 
 def test_white_changes_nothing():
-    """White vertices and white texels give the picture without them, in every shading."""
+    """White vertices and white texels give the same picture as a scene without them, in every shading."""
     scene = SCENES["perspective"]
     count = len(scene.mesh.vertices)
     mesh = replace(scene.mesh, colors=np.ones((count, 3)), coordinates=RNG.normal(size=(count, 2)))
@@ -111,7 +111,7 @@ def test_white_changes_nothing():
 
 
 def test_every_picture_has_the_albedo():
-    """A white surface without lights shows its albedo by every way to shade."""
+    """A white surface with ambient light alone shows its albedo in every shading."""
     material = Material((1,) * 3, 0, 0, 1, texture=TEXTURE)
     scene = painted(replace(SCENES["crossing"], lights=()), material, replace(material, texture=None))
     raster = rasterise(scene)
@@ -127,7 +127,7 @@ def test_every_picture_has_the_albedo():
 
 
 def test_parts_have_the_levels_of_their_span():
-    """Cuts and another order change neither a level nor the albedo of a pixel."""
+    """Cuts and another order of spans change neither a level nor the albedo of a pixel."""
     raster = rasterise(SCENE)
     cut, count = cut_by_angle(raster, 1.0)
     cut = sort_by_material(cut, SCENE.mesh.material)
@@ -147,7 +147,7 @@ def test_levels_only_where_needed():
     plain = replace(TEXTURED, texture=replace(TEXTURE, mipmapped=False))
     assert not len(rasterise(painted(SCENES["crossing"], plain)).level)
     assert not len(rasterise(SCENES["crossing"]).level)
-    # The texture of a material without faces counts for nothing.
+    # The texture of a material without faces has no effect.
     unused = replace(SCENES["crossing"], material=(MATERIAL, TEXTURED))
     assert not unused.has_albedo
     raster = rasterise(unused)

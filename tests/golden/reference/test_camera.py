@@ -8,7 +8,7 @@ from blysk.golden.reference.geometry import normalise
 
 
 def matrix(camera, width, height):
-    """World to pixels as one 4x4 matrix of the textbook kind: look-at, projection, viewport."""
+    """The way from the world to pixels as a 4x4 matrix of the textbooks: look-at, projection, viewport."""
     back = np.subtract(camera.position, camera.target)
     back = back / np.linalg.norm(back)
     right = np.cross(camera.up, back)
@@ -80,7 +80,7 @@ def test_framing_fits_all(projection, margin):
         )
         pixels = camera.project(vertices, width, height)
         share = pixels[:, :2] / (width, height)
-        # All inside the margin, and one vertex on it.
+        # All vertices are inside the margin, and one lies on it.
         assert np.abs(share - 0.5).max() == pytest.approx(0.5 - margin, abs=1e-9)
         assert (pixels[:, 2] > camera.near).all()
         assert camera.target == pytest.approx((vertices.min(axis=0) + vertices.max(axis=0)) / 2)

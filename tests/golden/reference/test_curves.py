@@ -18,7 +18,7 @@ def pair(degrees):
 
 
 def great_circle(degrees):
-    """Independent of the code: rotation by Rodrigues' formula."""
+    """Points of the great circle by Rodrigues' formula, which the code does not use."""
     left, right = pair(degrees)
     axis = np.cross(left, right) / math.sin(math.radians(degrees))
     angle = (T * math.radians(degrees))[:, np.newaxis]
@@ -59,7 +59,7 @@ def test_published_errors(degrees, linear, length, vector, angle):
 
 @pytest.mark.parametrize(("degrees", "shown"), [(30, "0.13"), (60, "1.1")])
 def test_great_circle_is_a_third_curve(degrees, shown):
-    """How far ``slerp`` is from what the methods are measured against."""
+    """Distance of ``slerp`` from the curve with which methods are compared."""
     left, right = pair(degrees)
     between = np.cross(interpolate("slerp", left, right, T), interpolate("normalised", left, right, T))
     angle = np.degrees(np.arcsin(np.linalg.norm(between, axis=1).max()))
@@ -69,7 +69,7 @@ def test_great_circle_is_a_third_curve(degrees, shown):
 @pytest.mark.parametrize("length", [1, 2, 3, 16, 4095])
 @pytest.mark.parametrize("degrees", [0, 1e-4, 1, 45, 89.9, 90, 120, 180])
 def test_stiff_span_angles_and_lengths(degrees, length):
-    """Every pixel of every curve against its own closed form in the angle; 180 degrees have no plane."""
+    """Every pixel of every curve is compared with the closed form of its angle. 180 degrees have no plane."""
     left, right = pair(degrees)
     angle = math.radians(degrees)
     t = np.arange(length) / max(length - 1, 1)
@@ -85,7 +85,7 @@ def test_stiff_span_angles_and_lengths(degrees, length):
     if degrees == 180:
         return
     assert size["normalised"] == pytest.approx(1, abs=1e-14)
-    # Along the middle normal, and along N_r - N_l: s = 2t - 1 runs from -1 to 1.
+    # Coordinates are along the middle normal, and along N_r - N_l: s = 2t - 1 goes from -1 to 1.
     s = 2 * t - 1
     middle = (left + right) / (2 * math.cos(angle / 2))
     along = found["quadratic"] @ middle
@@ -106,7 +106,7 @@ def test_exact_at_the_ends_and_in_the_middle(curve):
         middle = (left + right) / 2
         if curve != "linear":
             middle = middle / np.linalg.norm(middle)
-        # The half-way sum of normals 179 degrees apart keeps 1 / 57 of their length.
+        # The half-way sum of normals 179 degrees apart keeps 1/57 of their length.
         assert interpolate(curve, left, right, 0.5) == pytest.approx(middle, abs=1e-13)
 
 

@@ -14,15 +14,15 @@ from blysk.golden.reference.scene import Scene
 from blysk.golden.reference.texture import Texture
 
 SIDE = 8
-"""Pixels of a picture that a plate fills."""
+"""The pixels of a picture that a plate covers."""
 
 PLAIN = Material((0.5,) * 3, (0,) * 3, (0,) * 3, 1)
 CORNERS = np.array([[-1.0, -1], [1, -1], [1, 1], [-1, 1]])
-"""Of a plate."""
+"""Corners of a plate."""
 
 
 def scene_of(*materials, alpha=(), places=((0, 1), (1, 1), (1, 0), (0, 0))):
-    """Plates from front to back, each of its material, which a camera sees straight on."""
+    """Plates from front to back, each with its material. The camera sees them straight on."""
     count = len(materials)
     points = np.concatenate([np.column_stack([CORNERS, np.full(4, -0.1 * k)]) for k in range(count)])
     faces = np.concatenate([np.array([[0, 1, 2], [0, 2, 3]]) + 4 * k for k in range(count)])
@@ -39,7 +39,7 @@ def scene_of(*materials, alpha=(), places=((0, 1), (1, 1), (1, 0), (0, 0))):
 
 
 def shown(scene):
-    """Number of the plate at each pixel, -1: none; and the number of dropped fragments."""
+    """Number of the plate at each pixel, or -1 for none, and the number of dropped fragments."""
     raster = rasterise(scene)
     plate = np.full(SIDE * SIDE, -1)
     plate[raster.pixel[raster.visible]] = raster.triangle[raster.span[raster.visible]] // 2
@@ -48,19 +48,19 @@ def shown(scene):
 
 
 def holes(alpha, **looks):
-    """A material of an image with alpha."""
+    """A material with an image that has alpha."""
     alpha = np.array(alpha, float)
     image = Texture(np.ones((*alpha.shape, 3)), filter="nearest", mipmapped=False, alpha=alpha)
     return replace(PLAIN, texture=replace(image, **looks), cutoff=0.5)
 
 
 def test_holes_show_the_plate_behind():
-    """A checker of 4 x 4 texels, each of 2 x 2 pixels."""
+    """The image is a checker of 4 x 4 texels, each of 2 x 2 pixels."""
     checker = np.indices((4, 4)).sum(axis=0) % 2
     plate, dropped = shown(scene_of(holes(checker), PLAIN))
     assert (plate == np.repeat(np.repeat(1 - checker, 2, 0), 2, 1)).all()
     assert dropped == 32
-    # A plate behind has no holes of the plate in front, and what is hidden is dropped, too.
+    # A plate behind does not have the holes of the plate in front. Hidden fragments are dropped, too.
     plate, dropped = shown(scene_of(PLAIN, holes(checker)))
     assert (plate == 0).all()
     assert dropped == 32
@@ -88,7 +88,8 @@ def test_rounding_drops_no_opaque_pixel(filter):
 
 
 def test_alpha_is_a_product():
-    """0.8 times 0 to 1 from left to right, times 1 on the lower half and 0.75 on the upper half."""
+    """The alpha is 0.8, times 0 to 1 from left to right, times 1 on the lower half and 0.75 on the upper
+    half."""
     material = replace(holes([[0.75], [1.0]]), alpha=0.8)
     plate, _ = shown(scene_of(material, alpha=[0, 1, 1, 0]))
     x = (np.arange(SIDE) + 0.5) / SIDE
@@ -98,7 +99,7 @@ def test_alpha_is_a_product():
 
 
 def test_alpha_has_levels():
-    """Texels of half a pixel: a level of means, none of which a texel has."""
+    """Texels are half a pixel wide, so the level has means, and no texel of the image has these values."""
     rows = np.kron(np.array([[1.0, 0], [0, 1]]), np.ones((8, 8)))
     rows[::2, ::2] = 0.5
     material = replace(holes(rows, mipmapped=True), cutoff=0.8)

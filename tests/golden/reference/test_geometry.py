@@ -1,4 +1,4 @@
-"""Meshes that are none: each refused with what is wrong."""
+"""Wrong meshes are refused, with the reason."""
 
 import numpy as np
 import pytest

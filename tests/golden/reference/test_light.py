@@ -1,4 +1,4 @@
-"""Lights that fade by the distance and as spots."""
+"""Lights that fade with the distance, and spots."""
 
 import math
 
@@ -11,7 +11,7 @@ from blysk.golden.reference.reflection import BLINN
 
 
 def by_hand(light, point):
-    """Factor by the definition, without vectors of NumPy."""
+    """The factor by its definition, without vectors of NumPy."""
     way = [a - b for a, b in zip(point, light.position, strict=True)]
     distance = math.hypot(*way)
     k_0, k_1, k_2 = light.attenuation
@@ -40,7 +40,10 @@ def test_factor(attenuation, cone):
 
 
 def test_the_light_itself_and_far_away():
-    """In the light's own place it gives nothing along an axis; far away nothing; no NaN and no warning."""
+    """At the light's own place a spot gives nothing along its axis, and far away a light gives nothing.
+
+    There is no NaN and no warning.
+    """
     light = Light(position=(1, 2, 3), attenuation=(0, 0, 1e300), spot=(0, -1, 0))
     points = np.array([[1.0, 2, 3], [1e300, 0, 0], [1, -1e200, 3]])
     assert not light.factor(points).any()
@@ -48,7 +51,7 @@ def test_the_light_itself_and_far_away():
 
 
 def test_both_terms_have_the_factor():
-    """The light of an intensity is less by it, the ambient light is not."""
+    """The factor multiplies both terms of the light, and not the ambient light."""
     material = Material((0.1,) * 3, (0.5,) * 3, (0.4,) * 3, 20)
     normals, points = np.tile([0.0, 0, 1], (2, 1)), np.array([[0.0, 0, 0], [1, 0, 0]])
     plain = Light(position=(0, 0, 2))

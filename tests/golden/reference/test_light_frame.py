@@ -8,7 +8,7 @@ from blysk.golden.reference.light_frame import light_frame, squared_sine
 
 
 def _pairs():
-    """L and V: anywhere, equal, opposite, and nearly so."""
+    """L and V: anywhere, equal, opposite, and nearly equal or opposite."""
     rng = np.random.default_rng(7)
     for _ in range(50):
         yield tuple(normalise(rng.normal(size=(2, 3))))
@@ -21,7 +21,8 @@ def _pairs():
 
 @pytest.mark.parametrize("mirror", [False, True])
 def test_identities(mirror):
-    """Quotients of squares of vectors of any length are the sines of N·H and R·V, and the line is N·L."""
+    """For vectors of any length, the quotients of squares are the sines of N·H and R·V, and the line gives
+    N·L."""
     rng = np.random.default_rng(8)
     vectors = rng.normal(size=(500, 3)) * 10.0 ** rng.uniform(-6, 6, (500, 1))
     for light, viewer in _pairs():
@@ -46,7 +47,8 @@ def test_identities(mirror):
 
 
 def test_exponents_of_phong_and_blinn_in_the_space_of_normals():
-    """Near the peak R·V^n is as wide as N·H^(4 n) in the plane of L and V, as N·H^(4 n cos^2 a) across it."""
+    """Near the peak R·V^n is as wide as N·H^(4 n) in the plane of L and V, and as N·H^(4 n cos^2 a) across
+    it."""
     frame = light_frame(normalise(np.array([1.0, 0.2, 0.4])), normalise(np.array([-0.3, 0.1, 1.0])))
     for direction, ratio in (((1, 0), 4.0), ((0, 1), 4 * frame.cosine**2)):
         vector = np.array([*np.multiply(direction, 1e-3), 1.0])

@@ -21,7 +21,7 @@ from blysk.golden.reference.reflection import BLINN, REFLECTION_MODELS
 V = np.array([0.0, 0.0, 1.0])
 
 SUMMED = ("phong", "blinn", "cosquad", "cosquad7", "cosquad_q", "cosquad_lin")
-"""Models whose highlights `test_formula_channel_by_channel` writes out."""
+"""Models whose highlights `test_formula_channel_by_channel` computes by itself."""
 
 
 def grey(value):
@@ -35,7 +35,7 @@ def random_units(count, seed):
 def test_worked_example():
     material = Material(grey(0.1), grey(0.7), grey(0.5), 10)
     light = Light((1, 1, 1))
-    # I_a = 0.2, I_d = 0.8, I_s = 1: one light has one color here, so I_d goes into k_d.
+    # I_a = 0.2, I_d = 0.8, I_s = 1. In the project a light has one colour, so I_d goes into k_d.
     material = Material(material.ambient, grey(0.7 * 0.8), material.specular, 10)
     dark, matt = replace(material, diffuse=grey(0)), replace(material, specular=grey(0))
     for given, total in ((material, 0.345374), (dark, 0.02 + 0.002058), (matt, 0.02 + 0.323316)):
@@ -47,7 +47,7 @@ def test_worked_example():
     assert round(0.02 + 0.323 + 0.0015, 4) == 0.3445
 
 
-# The sum does not depend on the model; test_reflection.py holds each model to its formula.
+# The sum does not depend on the model. test_reflection.py compares each model with its formula.
 @pytest.mark.parametrize("model", SUMMED)
 def test_formula_channel_by_channel(model):
     n = 9
@@ -84,7 +84,7 @@ def test_formula_channel_by_channel(model):
 @pytest.mark.parametrize("model", REFLECTION_MODELS)
 def test_light_behind_gives_nothing(model):
     material = Material(grey(0.1), grey(0.7), grey(0.5), 1)
-    # N·L = 0 exactly, and below: with exponent 1 the cosine N·H alone would give a highlight.
+    # N·L is exactly 0, and under 0. With exponent 1 the cosine N·H alone would give a highlight.
     for direction in ((1, 0, 0), (1, 0, -0.01)):
         assert intensity(
             V, material, [Light(direction)], grey(1), V, REFLECTION_MODELS[model]
@@ -93,7 +93,7 @@ def test_light_behind_gives_nothing(model):
 
 @pytest.mark.parametrize("model", REFLECTION_MODELS)
 def test_light_opposite_to_the_viewer_has_no_highlight_of_a_halfway_vector(model):
-    """There is no H; R·V is 1 - 2 (N·L)^2, and needs none."""
+    """There is no H. R·V is 1 - 2 (N·L)^2, and needs no H."""
     material = Material(grey(0.1), grey(0.7), grey(0.5), 1)
     direction = normalise([1, 2, 3])
     light = Light(-direction)
@@ -109,9 +109,9 @@ def test_light_opposite_to_the_viewer_has_no_highlight_of_a_halfway_vector(model
 
 @pytest.mark.parametrize("model", REFLECTION_MODELS)
 def test_stiff_terminator(model):
-    """N·L around 0 with ``k_s`` 1: the highlight is cut there, the diffuse term continuous."""
+    """N·L goes through 0 with ``k_s`` 1. The highlight is cut there, and the diffuse term is continuous."""
     material = Material(grey(0), grey(1), grey(1), 1)
-    # Behind the light's edge as seen from V: N·H is far from 0 where N·L is 0.
+    # Seen from V, these are behind the light's edge: N·H is far from 0 where N·L is 0.
     light = Light((1, 0, 0))
     halfway = halfway_vector(light.direction, V)
     for tilt in (1e-3, 1e-9, 1e-15, 5e-324):
@@ -126,7 +126,7 @@ def test_stiff_terminator(model):
 
 
 def test_stiff_half_way_vectors():
-    """L = V, and L near -V, where L + V is all but 0."""
+    """L = V, and L near -V, where L + V is nearly 0."""
     for direction in normalise(np.random.default_rng(11).normal(size=(20, 3))):
         assert halfway_vector(direction, direction) == pytest.approx(direction, abs=1e-15)
         assert (halfway_vector(-direction, direction) == 0).all()
@@ -135,7 +135,7 @@ def test_stiff_half_way_vectors():
             opposite = -math.cos(angle) * direction + math.sin(angle) * side
             half = halfway_vector(opposite, direction)
             assert np.linalg.norm(half) == pytest.approx(1, abs=1e-14)
-            # H stands at right angles to V but for half the angle; L + V keeps 1e-16/angle of its digits.
+            # H is at a right angle to V, less half the angle. L + V keeps 1e-16/angle of its digits.
             assert half == pytest.approx(
                 math.cos(angle / 2) * side + math.sin(angle / 2) * direction, abs=1e-15 / angle
             )
@@ -143,7 +143,10 @@ def test_stiff_half_way_vectors():
 
 @pytest.mark.parametrize("model", REFLECTION_MODELS)
 def test_stiff_lengths_of_normals(model):
-    """0 gives the ambient term alone; 1 +- 1/256 puts N·L off by 1/256; what is no number stays none."""
+    """A length of 0 gives the ambient term alone.
+
+    Lengths of 1 +- 1/256 change N·L by 1/256. NaN stays NaN.
+    """
     n = 1000
     material = Material(grey(0.1), grey(0.5), grey(0.4), n)
     lights = [Light(V)]
@@ -155,11 +158,11 @@ def test_stiff_lengths_of_normals(model):
     ).all()
     for scale in (1 - 1 / 256, 1 + 1 / 256):
         value = intensity(V * scale, material, lights, grey(1), V, REFLECTION_MODELS[model])
-        # R·V with R = 2 (N·L) N - L: twice the scale squared, less 1.
+        # R·V with R = 2 (N·L) N - L is twice the squared scale, less 1.
         cosine = min(2 * scale**2 - 1 if model == "phong" else scale, 1.0)
         expected = 0.1 + 0.5 * scale + 0.4 * float(REFLECTION_MODELS[model].reflect(cosine, n))
         assert value == pytest.approx(grey(expected), rel=1e-12)
-    # The error that a user gets from a normal 1/256 too short: the highlight of every model is gone.
+    # A normal that is 1/256 too short loses the highlight of every model.
     assert float(REFLECTION_MODELS[model].reflect(1 - 1 / 256, n)) < 0.05
 
 
@@ -174,7 +177,7 @@ def test_halfway_vector():
 
 
 def test_halfway_vectors_of_arrays():
-    """Each as alone; opposite vectors have none."""
+    """Each vector of an array is found as if alone. Opposite vectors have none."""
     lights, viewers = random_units(50, 8), random_units(50, 9)
     viewers[::5] = -lights[::5]
     half = halfway_vector(lights, viewers)
@@ -184,7 +187,7 @@ def test_halfway_vectors_of_arrays():
     np.testing.assert_array_equal(halfway_vector(lights, V), [halfway_vector(light, V) for light in lights])
 
 
-# Point lights and a near viewer
+# Point lights and a near viewer.
 
 
 def test_point_light_towards():
@@ -202,7 +205,7 @@ def test_point_light_towards():
 @pytest.mark.parametrize("chord", [False, True])
 @pytest.mark.parametrize("model", SUMMED)
 def test_local_formula_point_by_point(model, chord):
-    """Each point as if it were alone, with a directional light and a distant viewer of its own."""
+    """Each point is shaded as if it were alone, with its own directional light and its own distant viewer."""
     rng = np.random.default_rng(10)
     normals, points = random_units(60, 11), rng.normal(size=(60, 3))
     eye = np.array([0.3, 0.4, 5.0])
@@ -222,13 +225,14 @@ def test_local_formula_point_by_point(model, chord):
 
 @pytest.mark.parametrize("model", REFLECTION_MODELS)
 def test_stiff_point_light_on_the_surface_and_behind_it(model):
-    """At its own place it gives nothing; with L = -V there is no highlight; nothing is NaN."""
+    """At its own place a light gives nothing. With L = -V there is no highlight. No value is NaN."""
     material = Material(grey(0.1), grey(0.5), grey(0.5), 1)
     light = Light(position=(0, 0, -1))
     points = np.array([[0.0, 0, -1], [0, 0, 0], [0, 0, -2]])
     normals = np.array([[0.0, 0, 1], [0, 0, -1], [0, 0, 1]])
     value = intensity(normals, material, [light], grey(1), V, REFLECTION_MODELS[model], points=points)
-    # At the light, between light and viewer (L = -V) seen from behind, and beyond it, lit from the front.
+    # The points are at the light, between light and viewer (L = -V, seen from behind), and beyond it, lit
+    # from the front.
     assert value[0] == pytest.approx(grey(0.1))
     assert value[1] == pytest.approx(grey(0.6))
     assert value[2] == pytest.approx(grey(1.1), abs=1e-9)
@@ -241,7 +245,7 @@ def test_stiff_point_light_on_the_surface_and_behind_it(model):
 
 @pytest.mark.parametrize("model", [name for name, model in REFLECTION_MODELS.items() if not model.MIRROR])
 def test_intensity_of_cosines(model):
-    """The same sum from N·L and N·H."""
+    """The sum from N·L and N·H is the same."""
     normals = random_units(300, 14)
     lights = [Light((1, 2, 3), (0.5, 0.6, 0.7)), Light((-3, 2, 1))]
     material = Material((0.1, 0.2, 0.3), (0.4, 0.5, 0.6), (0.7, 0.8, 0.9), 9, fresnel=(0.04, 0.3, 1))
@@ -253,12 +257,12 @@ def test_intensity_of_cosines(model):
 
 
 def test_fresnel():
-    """k_s times F_0 + (1 - F_0)(1 - V·H)^5, of a distant light and viewer; else times F_0."""
+    """k_s is multiplied by F_0 + (1 - F_0)(1 - V·H)^5 for a distant light and viewer, otherwise by F_0."""
     assert schlick(0.04, np.array([1.0, 0.5, 0.0])) == pytest.approx([0.04, 0.04 + 0.96 / 32, 1])
     f0 = np.array([0.04, 0.5, 1.0])
     given = Material(grey(0), grey(0), (0.5, 0.25, 2), 9, fresnel=tuple(f0))
     normals, points = random_units(50, 3), random_units(50, 4)
-    # 120 degrees from the viewer, so that V·H is 1/2; and far away in the same direction.
+    # The directions are 120 degrees from the viewer, so that V·H is 1/2. A far light has the same direction.
     direction = (math.sqrt(3) / 2, 0, -0.5)
     expected = intensity(normals, replace(given, fresnel=None), [Light(direction)], grey(0), V, BLINN)
     assert expected.max() > 0.5
@@ -334,7 +338,10 @@ def test_refusals():
 
 
 def test_roughness_of_a_material():
-    """Its own, or that of the exponent; models with an exponent, or without a parameter, do not read it."""
+    """A material has its own roughness, or that of its exponent.
+
+    Models with an exponent, or without a parameter, do not read it.
+    """
     plain, rough = (Material((0,) * 3, (0,) * 3, (0,) * 3, 20, roughness) for roughness in (None, 0.3))
     assert rough.parameter(GGX) == 0.3
     assert plain.parameter(GGX) == pytest.approx((2 / 22) ** 0.25)
@@ -346,9 +353,11 @@ def test_roughness_of_a_material():
 
 
 def test_material_of_metallic_roughness():
-    """A dielectric reflects 4% and its base colour; a metal its base colour, and nothing diffuse.
+    """A dielectric reflects 4 % and its base colour.
 
-    k_s makes the highlight's peak what D / 4 over 1 / pi is, with D of the model itself.
+    A metal reflects its base colour, and has no diffuse light.
+
+    k_s makes the highlight's peak as large as D/4, relative to 1/pi, with D of the model itself.
     """
     base = (0.8, 0.5, 0.2)
     dielectric, metal = (Material.of_metallic_roughness(base, metallic, 0.4) for metallic in (0, 1))
@@ -369,7 +378,10 @@ def test_material_of_metallic_roughness():
 
 
 def test_material_of_specular_glossiness():
-    """With F_0 = 0.04 a dielectric's, but for the diffuse light that F_0 takes; without diffuse a metal."""
+    """With F_0 = 0.04 the material is that of a dielectric, less the diffuse light that F_0 takes.
+
+    Without diffuse light it is a metal.
+    """
     base = (0.8, 0.5, 0.2)
     made = Material.of_specular_glossiness(base, (0.04,) * 3, 0.6)
     same = Material.of_metallic_roughness(base, 0, 0.4)

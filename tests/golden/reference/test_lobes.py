@@ -23,7 +23,8 @@ from blysk.golden.reference.reflection import BLINN, PHONG
 
 ROUGHNESS = (0.05, 0.1, 0.2, 0.3, 0.5, 0.7, 0.8, 0.85, 0.9, 0.99, 0.999, 1.0)
 
-# A rough surface with slopes (x, y): how many have the slope r = tan gamma away from 0, for a width alpha.
+# A rough surface with slopes (x, y). The function gives the density at the slope r = tan gamma from 0, for a
+# width alpha.
 SLOPES = {
     "beckmann": lambda r, alpha: math.exp(-((r / alpha) ** 2)) / (math.pi * alpha**2),
     "ggx": lambda r, alpha: 1 / (math.pi * alpha**2 * (1 + (r / alpha) ** 2) ** 2),
@@ -35,7 +36,7 @@ def density(model, gamma, roughness):
 
 
 def integral(function, alpha, end=math.pi / 2):
-    """From 0 to a right angle, in parts that are short where the lobe is steep."""
+    """Integral from 0 to a right angle, in parts that are short where the lobe is steep."""
     ends = sorted({0.0, end, *(min(end, alpha * 4.0**k) for k in range(-3, 8))})
     return sum(quad(function, a, b, epsabs=0, epsrel=1e-11, limit=200)[0] for a, b in pairwise(ends))
 
@@ -43,7 +44,7 @@ def integral(function, alpha, end=math.pi / 2):
 @pytest.mark.parametrize("roughness", ROUGHNESS)
 @pytest.mark.parametrize("model", [BECKMANN, GGX], ids=lambda model: model.name)
 def test_microfacets_are_those_of_a_surface_with_such_slopes(model, roughness):
-    """``D = P(tan gamma) / cos^4 gamma``: the slopes of a height field, whose area is projected to 1."""
+    """``D = P(tan gamma) / cos^4 gamma`` for the slopes of a height field, whose area projects to 1."""
     alpha = roughness**2
     for gamma in (*np.linspace(0, 1.56, 40), *(alpha * np.linspace(0.1, 5, 20) % 1.5)):
         expected = SLOPES[model.name](math.tan(gamma), alpha) / math.cos(gamma) ** 4
@@ -56,7 +57,7 @@ def test_microfacets_are_those_of_a_surface_with_such_slopes(model, roughness):
 
 @pytest.mark.parametrize("roughness", [0.1, 0.5, 0.9, 1.0])
 def test_microfacets_are_those_that_the_sampling_rules_draw(roughness):
-    """Walter 2007: ``tan^2 = -alpha^2 ln(1 - x)`` and ``tan^2 = alpha^2 x / (1 - x)`` for x uniform."""
+    """Walter 2007 has ``tan^2 = -alpha^2 ln(1 - x)`` and ``tan^2 = alpha^2 x / (1 - x)`` for uniform x."""
     alpha = roughness**2
     rules = {
         BECKMANN: lambda x: -(alpha**2) * math.log1p(-x),
@@ -90,7 +91,7 @@ def test_largest_value_is_one(model, roughness):
 
 
 def test_beckmann_of_a_large_alpha():
-    """At alpha = 1 the largest value is 4/e times that at the peak of a narrow one."""
+    """At alpha = 1 the largest value is 4/e times the value at the peak of a narrow lobe."""
     assert BECKMANN.reflect(1.0, 1.0) == pytest.approx(math.e / 4)
     assert BECKMANN.reflect(math.sqrt(0.5), 1.0) == pytest.approx(1)
 
@@ -105,7 +106,7 @@ def test_formula_of_ggx_in_one_minus_cosine(alpha):
 @pytest.mark.parametrize("roughness", ROUGHNESS)
 @pytest.mark.parametrize("model", [BECKMANN, GGX], ids=lambda model: model.name)
 def test_energy_factors(model, roughness):
-    """The viewer along the normal: H half-way, so that the angle of L is twice that of H."""
+    """The viewer is along the normal, so H is half-way, and the angle of L is twice that of H."""
     reflected = integral(
         lambda t: 2 * math.pi * float(model.reflect(math.cos(t / 2), roughness)) * math.cos(t) * math.sin(t),
         2 * roughness**2,
@@ -114,7 +115,7 @@ def test_energy_factors(model, roughness):
 
 
 def test_energy_factor_of_ggx_near_alpha_1():
-    """Where the series takes the place of the closed form."""
+    """Here the series takes the place of the closed form."""
     for alpha in (0.9999, 0.9998, 0.99995):
         reflected = integral(
             lambda t, alpha=alpha: (
@@ -134,7 +135,7 @@ def test_coplanar_phong_is_phong_in_a_plane():
     rng = np.random.default_rng(1)
     for exponent in (1, 7, 100):
         axis, light, viewer, normal = rng.normal(size=(4, 2000, 3))
-        # All three in the plane at right angles to the axis; L and V not opposite.
+        # All three vectors are in the plane perpendicular to the axis. L and V are not opposite.
         axis = normalise(axis)
         plane = [normalise(v - (v * axis).sum(-1, keepdims=True) * axis) for v in (light, viewer, normal)]
         light, viewer, normal = plane
@@ -152,7 +153,7 @@ def test_coplanar_phong_is_phong_in_a_plane():
 
 
 def test_coplanar_phong_is_not_phong_elsewhere():
-    """Light and viewer at 60 degrees on different sides of N, which leaves their plane by 10 degrees."""
+    """Light and viewer are 60 degrees from N on different sides, and N leaves their plane by 10 degrees."""
     light, viewer = (np.array([sign * math.sin(math.pi / 3), 0, 0.5]) for sign in (1, -1))
     normal = np.array([0, math.sin(math.radians(10)), math.cos(math.radians(10))])
     mirror = 2 * (normal @ light) * normal - light
@@ -169,7 +170,10 @@ def test_coplanar_phong_tends_to_blinn_with_four_times_the_exponent():
 
 
 def test_roughness_and_exponent():
-    """Blinn's power is near Beckmann's distribution of the same alpha; one mapping reverses the other."""
+    """Blinn's power is near Beckmann's distribution of the same alpha.
+
+    Both mappings are inverse to each other.
+    """
     for roughness in (0.1, 0.2, 0.3):
         exponent = exponent_of_roughness(roughness)
         assert exponent == pytest.approx(2 / roughness**4 - 2)
@@ -297,7 +301,7 @@ def test_bad_files_are_refused(tmp_path, text, message):
 
 
 def test_steepness():
-    """The largest slope: of Blinn's power its exponent, of GGX 4/alpha^2 for a small alpha."""
+    """The largest slope of Blinn's power is its exponent, and that of GGX is 4/alpha^2 for a small alpha."""
     assert BLINN.steepness(70) == 70
     assert COPLANAR_PHONG.steepness(20) == 80
     for roughness in (0.2, 0.3):

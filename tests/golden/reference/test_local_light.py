@@ -26,7 +26,8 @@ LOCAL = (
 
 @pytest.mark.parametrize("name", LOCAL)
 def test_fragment_positions(name):
-    """On their triangles, and projected where their pixels are, to the 1/256 pixel of the vertices."""
+    """Fragments lie on their triangles, and project to their pixels within the 1/256 pixel of the
+    vertices."""
     scene = SCENES[name]
     raster = rasterise(scene)
     points = fragment_positions(scene, raster, np.arange(len(raster.span)))
@@ -37,7 +38,7 @@ def test_fragment_positions(name):
     x, y, _ = scene.camera.project(points, scene.width, scene.height).T
     centre = raster.pixel % scene.width + 0.5, raster.pixel // scene.width + 0.5
     miss = np.hypot(x - centre[0], y - centre[1])
-    # Slivers and clipped triangles stretch the steps.
+    # Slivers and clipped triangles make the steps longer.
     assert np.median(miss) < 2 / 256
     assert np.quantile(miss, 0.95) < 0.1
 
@@ -68,7 +69,8 @@ def test_far_lamps_and_a_far_camera_are_distant(shading, far):
 
 @pytest.mark.parametrize("shading", SHADINGS)
 def test_every_shading_of_point_lights(shading):
-    """At the middle of the triangle, at its vertices, at every fragment: as `intensity` has it there."""
+    """At the middle of the triangle, at its vertices, and at every fragment, colours are those of
+    `intensity`."""
     scene = SCENES["point light and near viewer"]
     raster = rasterise(scene)
     image = render(scene, shading, COSQUAD, raster, Thresholds(9, 9, 9)).image

@@ -13,14 +13,14 @@ def test_by_hand():
     image[4, 4, 0] -= 8
     figures = error_figures(image, reference)
     assert figures.max_lsb == 8
-    # 3000 sorted errors: the 99.9th percentile lies at index 2996.001, among the zeros.
+    # Of 3000 sorted errors the 99.9th percentile lies at index 2996.001, among the zeros.
     assert figures.p999_lsb == 0
     assert figures.rmse_lsb == pytest.approx(math.sqrt(100 / 3000), rel=1e-15)
     assert figures.psnr_db == pytest.approx(10 * math.log10(255**2 / (100 / 3000)), rel=1e-12)
 
 
 def test_percentile_is_between_neighbours():
-    # 1001 errors 0 to 1000: the 99.9th percentile is the one at index 999.
+    # Of 1001 errors from 0 to 1000 the 99.9th percentile is the error at index 999.
     image = np.arange(1001.0).reshape(7, 143)
     assert error_figures(image, np.zeros((7, 143))).p999_lsb == pytest.approx(999, rel=1e-12)
 
@@ -41,7 +41,7 @@ def test_equal_images_and_unsigned_types():
     image = np.arange(48, dtype=np.uint8).reshape(4, 4, 3)
     figures = error_figures(image, image.astype(np.float64))
     assert (figures.max_lsb, figures.rmse_lsb, figures.psnr_db) == (0, 0, math.inf)
-    # 0 - 1 must not wrap round to 255.
+    # 0 - 1 must not wrap to 255.
     assert error_figures(np.zeros((1, 1), np.uint8), np.ones((1, 1), np.uint8)).max_lsb == 1
 
 
@@ -52,7 +52,7 @@ def test_normalised_errors():
     value, share = mnse_published(image, reference)
     assert value == pytest.approx((1 / 9 + 0 + 0 + 4 / 9) / 4)
     assert share == 1
-    # The middle value is the mean: printed form undefined there.
+    # The middle value is the mean, where the printed form is undefined.
     value, share = mnse_published(np.array([1.0, 3.0, 3.0]), np.array([0.0, 2.0, 4.0]))
     assert value == pytest.approx((1 / 4 + 1 / 4) / 2)
     assert share == pytest.approx(2 / 3)

@@ -17,9 +17,9 @@ MATERIAL = Material(GREY, GREY, GREY, 10)
 
 
 def pixel_scene(points, faces, width, height, normals=None, **options):
-    """A scene whose vertices are given in pixels (x, y down) and distance towards the viewer.
+    """A scene whose vertices are given in pixels (x, y down) and in distance towards the viewer.
 
-    One world unit is one pixel and all numbers are small dyadic ones, so that projection is exact.
+    One world unit is one pixel. All numbers are small dyadic numbers, so the projection is exact.
     """
     points = np.asarray(points, dtype=np.float64)
     vertices = points * (1, -1, 1) + (-width / 2, height / 2, 0)
@@ -39,11 +39,11 @@ def barycentrics(triangle, x, y):
 
 
 def covers(triangle, column, row):
-    """Whether the pixel's centre, in exact integers, belongs to the triangle, in 1/256 pixel.
+    """Whether the pixel's centre belongs to the triangle, in exact integers of 1/256 pixel.
 
-    Ties on an edge, independently of any edge classification: a centre belongs to the triangle that holds it
-    once it is moved right by an infinitesimal and down by its square. Edge functions are whole numbers, and
-    with coordinates below 2^16 the moves of 2^-40 and 2^-80 change one by less than 1.
+    Ties on an edge are decided without classes of edges: the centre is moved right by an infinitesimal, and
+    down by the square of this. The triangle that then contains it has it. Edge functions are whole numbers.
+    With coordinates below 2^16 the moves of 2^-40 and 2^-80 change a function by less than 1.
     """
     one = 1 << 80
     x, y = (256 * column + 128) * one + (1 << 40), (256 * row + 128) * one + 1
@@ -56,7 +56,8 @@ def covers(triangle, column, row):
 
 
 def brute_force(points, faces, width, height):
-    """Exact rational coverage and depth: nearest triangle of every pixel, or -1, and the covered pairs."""
+    """Exact rational coverage and depth: the nearest triangle of every pixel, or -1, and the covered
+    pairs."""
     exact = [[Fraction(float(value)) for value in point] for point in points]
     steps = [[int(value * 256) for value in point[:2]] for point in exact]
     owner = np.full((height, width), -1)
@@ -85,7 +86,7 @@ def found_owner(raster, width, height):
 
 
 def check_structure(scene, raster):
-    """What must hold of every raster."""
+    """Check what every raster has to fulfil."""
     assert (raster.length >= 1).all()
     assert (raster.x >= 0).all()
     assert (raster.x + raster.length <= scene.width).all()
@@ -134,7 +135,7 @@ def test_every_pixel_of_a_triangulation_exactly_once(seed, step):
 @pytest.mark.parametrize("step", [2, 256])
 @pytest.mark.parametrize("seed", range(4))
 def test_coverage_and_occlusion_of_random_triangles(seed, step):
-    # Both windings, overlaps, intersections, corners off the screen.
+    # Both windings, overlaps, intersections, and corners off the screen.
     rng = np.random.default_rng(100 + seed)
     width, height = 20, 15
     points = np.column_stack((grid(rng, (36, 2), -6, 24, step), grid(rng, 36, -8, 8)))
@@ -145,7 +146,7 @@ def test_coverage_and_occlusion_of_random_triangles(seed, step):
     owner, pairs = brute_force(points, faces, width, height)
     assert (found_owner(raster, width, height) == owner).all()
     fragments = set(zip(raster.triangle[raster.span].tolist(), raster.pixel.tolist(), strict=True))
-    # Kept spans are whole: what is missing lies on scanlines of which nothing of that triangle is visible.
+    # Kept spans are whole. A missing fragment lies on a scanline where nothing of its triangle is visible.
     assert fragments <= pairs
     lines = {(t, p // width) for t, p in pairs}
     kept_lines = {(t, p // width) for t, p in fragments}
@@ -156,11 +157,12 @@ def test_coverage_and_occlusion_of_random_triangles(seed, step):
 
 
 def test_spans_of_a_known_triangle():
-    # Right angle at the top left pixel centre, legs of 4: edges through pixel centres everywhere.
+    # The right angle is at the top left pixel centre, and the legs are 4 pixels long: edges go through pixel
+    # centres everywhere.
     points = [[0.5, 0.5, 0], [4.5, 0.5, 0], [0.5, 4.5, 0]]
     scene = pixel_scene(points, [[0, 1, 2]], 8, 8)
     raster = rasterise(scene)
-    # The slanted edge is a right one: its centres are out.
+    # The slanted edge is a right edge, so its centres do not belong to the triangle.
     assert raster.x.tolist() == [0, 0, 0, 0]
     assert raster.y.tolist() == [0, 1, 2, 3]
     assert raster.length.tolist() == [4, 3, 2, 1]
@@ -178,7 +180,7 @@ def test_triangle_of_one_pixel_and_of_none():
 
 
 def test_slivers():
-    # A fan of needles 1/256 pixel wide at their ends, together covering a rectangle exactly once.
+    # A fan of needles, 1/256 pixel wide at their ends, covers a rectangle exactly once.
     width, height = 30, 6
     right = np.arange(height * 256 + 1) / 256
     points = np.concatenate(
@@ -195,7 +197,8 @@ def test_slivers():
 
 def test_degenerate_triangles_are_counted():
     points = [[1, 1, 0], [5, 5, 0], [3, 3, 0], [1, 1, 5], [5.001, 5, 0], [1.001, 1, 0], [5, 1, 0]]
-    # No area in the world twice; seen edge-on; gone when rounded to 1/256 pixel; a good one.
+    # Two triangles without area in the world, one seen edge-on, one that vanishes when rounded to 1/256
+    # pixel, and a good one.
     faces = [[0, 1, 2], [0, 0, 1], [0, 1, 3], [0, 5, 0], [0, 1, 6]]
     scene = pixel_scene(points, faces, 8, 8)
     raster = rasterise(scene)
@@ -212,18 +215,19 @@ def test_off_screen():
     scene = pixel_scene(points, np.arange(12).reshape(4, 3), 8, 8)
     raster = rasterise(scene)
     assert (raster.outside, len(raster.x)) == (4, 0)
-    # Around a corner of the screen: wholly outside no single border, and yet not in the picture.
+    # These lie around a corner of the screen. No single border excludes them, and still they are not in the
+    # picture.
     corner = pixel_scene([[-10, 5, 0], [5, -10, 0], [-10, -10, 0]], [[0, 1, 2]], 8, 8)
     raster = rasterise(corner)
     assert (raster.uncovered, len(raster.x)) == (1, 0)
-    # Behind the camera.
+    # This is behind the camera.
     raster = rasterise(pixel_scene(np.add(shape, (0, 0, 5000)), [[0, 1, 2]], 8, 8))
     assert (raster.outside, len(raster.x)) == (1, 0)
 
 
 @pytest.mark.parametrize("size", [2.0**12, 2.0**19, 2.0**24, 2.0**40])
 def test_huge_triangles(size):
-    # The two halves of a huge square, cut by a line through the picture with a slope of 2.
+    # Two halves of a huge square, cut by a line through the picture with a slope of 2.
     points = [[-size, -size, 0], [size, -size, 0], [size, size, 0], [-size, size, 0]]
     points += [[16 - size / 2, 8 - size, 0], [16 + size / 2, 8 + size, 0]]
     faces = [[0, 4, 5], [0, 5, 3], [4, 1, 2], [4, 2, 5]]
@@ -281,7 +285,7 @@ def test_normals_and_barycentrics_of_an_exact_projection():
         shares = np.array([float(share) for share in shares])
         assert found_shares[fragment] == pytest.approx(shares, abs=1e-13)
         exact = normalise(shares @ normals[face])
-        # Vertex normals may nearly cancel; these keep at least a hundredth of their length.
+        # Vertex normals may nearly cancel. These keep at least a hundredth of their length.
         assert np.linalg.norm(shares @ normals[face]) > 0.01
         assert found_normals[fragment] == pytest.approx(exact, abs=1e-11)
         if raster.offset[fragment] == 0:
@@ -308,7 +312,7 @@ def test_back_faces():
     raster = rasterise(replace(scene, back_faces="cull"))
     assert raster.culled == 1
     assert set(raster.triangle.tolist()) == {0}
-    # A material that is two-sided is not culled, but turned.
+    # A two-sided material is not culled: its normals are turned.
     both = replace(scene.material, two_sided=True)
     for material, triangles in (
         (both, {0, 1}),
@@ -325,14 +329,14 @@ def test_back_faces():
 
 
 def test_cancelled_normals_become_the_normal_of_the_face():
-    # Normals of opposite vertices cancel in the middle of the first scanline, at pixel 4 of 9 exactly.
+    # Normals of opposite vertices cancel in the middle of the first scanline, exactly at pixel 4 of 9.
     points = [[0.5, 0.5, 0], [8.5, 0.5, 0], [0.5, 8.5, 0]]
     normals = np.array([[1.0, 0, 0], [-1, 0, 0], [1, 0, 0]])
     scene = pixel_scene(points, [[0, 2, 1]], 9, 9, normals)
     raster = rasterise(scene)
     middle = fragment_normals(scene, raster, raster.pixel == 4)
     assert middle.tolist() == [[0, 0, 1]]
-    # They cancel along the whole column 4, where the fourth scanline's span ends.
+    # They cancel along the whole column 4, where the span of the fourth scanline ends.
     assert raster.repaired_normals == 1
     assert raster.length[3] == 5
     assert raster.normal_right[3].tolist() == [0, 0, 1]
@@ -355,7 +359,7 @@ def test_empty_mesh():
 def test_results_do_not_depend_on_the_chunks(monkeypatch):
     rng = np.random.default_rng(21)
     points = np.column_stack((grid(rng, (90, 2), -6, 70), grid(rng, 90, 0, 3, 1)))
-    # Whole numbers for depths: many exact ties between parallel triangles, also across chunks.
+    # Depths are whole numbers, so parallel triangles have many exact ties, also across chunks.
     points[:, 2] = np.repeat(points[::3, 2], 3)
     scene = pixel_scene(points, np.arange(90).reshape(30, 3), 64, 48)
     whole = rasterise(scene)

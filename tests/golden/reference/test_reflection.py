@@ -9,17 +9,17 @@ from blysk.golden.reference.reflection import REFLECTION_MODELS, coscos_scale, e
 from ...lists import LINE_MODELS
 
 EXPONENTS = range(2, 1001)
-# The models depend on x = n (1 - c) almost alone; above x = 30 Blinn is below 1e-13 and the others are 0.
-# The largest error lies at most half a step of 0.005 from a sample and its second derivative is below 3, so
-# the samples miss at most 1e-5 of it.
+# The models depend almost only on x = n (1 - c). Above x = 30 Blinn's power is below 1e-13 and the other
+# models are 0. The largest error is at most half a step of 0.005 from a sample, and its second derivative is
+# below 3. So the samples miss at most 1e-5 of the error.
 X = np.linspace(0, 30, 6001)
-# [C] does not define its "epicentre zone". From here up it gives the 7.924 % that [C] prints for f2; the
+# [C] does not define its "epicentre zone". From this brightness up, f2 has the 7.924 % that [C] prints. The
 # rounded 0.594 gives 7.90 %.
 ZONE = 0.59363
 
 
 def errors(model):
-    """Largest absolute error against Blinn, and largest relative one in the zone."""
+    """Largest absolute error against Blinn's power, and largest relative error in the zone."""
     absolute, relative = 0.0, 0.0
     for n in EXPONENTS:
         cosine = np.append(1 - X[n >= X] / n, ZONE ** (1 / n))
@@ -75,7 +75,7 @@ def test_errors_over_the_whole_range(model, shown):
 
 @pytest.mark.parametrize(("n", "shown"), [(16, "0.19"), (64, "0.20"), (256, "0.20")])
 def test_schlick_is_no_better_than_the_parabola(n, shown):
-    """A rival of the literature that the project does not build: ``c / (n - n c + c)``."""
+    """A model of the literature that the project does not build: ``c / (n - n c + c)``."""
     cosine = 1 - np.linspace(0, min(n, 30), 6001) / n
     error = np.abs(cosine / (n - n * cosine + cosine) - cosine**n).max()
     assert f"{error:.2f}" == shown
@@ -83,7 +83,10 @@ def test_schlick_is_no_better_than_the_parabola(n, shown):
 
 
 def test_refitted_slopes_are_minimax():
-    """No slope near has a largest error 2e-4 smaller, the price of a line in n and four digits."""
+    """No slope near has a largest error that is smaller by 2e-4.
+
+    This is the cost of a line in n and of four digits.
+    """
     for model, power, slack in (
         ("lyon1_refitted", 2, 2e-4),
         ("lyon2_refitted", 4, 2e-4),
@@ -135,11 +138,11 @@ def test_coscos_models():
         for n in (1, 10, 1000):
             angle = coscos_scale(n, k, rule) * gamma
             expected = [math.cos(value) ** k if value < math.pi / 2 else 0.0 for value in angle.tolist()]
-            # The cosine of an angle near 0 tells the angle to 1e-8 only.
+            # The cosine of an angle near 0 gives the angle only to 1e-8.
             assert REFLECTION_MODELS[model].reflect(np.cos(gamma), n) == pytest.approx(
                 expected, abs=1e-12 * n
             )
-    # Equal integrals spread the error: smaller at its largest, larger about the peak.
+    # Equal integrals spread the error: the largest error is smaller, and the error near the peak larger.
     for n in (20, 1000):
         cosine = 1 - X[n >= X] / n
         for k in (2, 4):
@@ -199,13 +202,16 @@ def test_linear_fit_of_the_slope(line, error):
 def test_slopes():
     assert REFLECTION_MODELS["cosquad"].slope(20) == 10
     assert REFLECTION_MODELS["cosquad7"].slope(16) == 7
-    # fQ meets Blinn where Blinn is Q = 0.64: at c = 0.64^(1/n).
+    # fQ meets Blinn's power where this is Q = 0.64: at c = 0.64^(1/n).
     for n in (1, 10, 1000):
         assert REFLECTION_MODELS["cosquad_q"].reflect(0.64 ** (1 / n), n) == pytest.approx(0.64, rel=1e-9)
 
 
 def test_stiff_exponents():
-    """From 1 to 1000: within 0 and 1, falling with the angle, 1 at the peak; so the second lobe is gated."""
+    """At exponents 1 to 1000 models are within 0 and 1, fall with the angle, and are 1 at the peak.
+
+    So the second lobe is cut off.
+    """
     # The parabola (n/2 (c - 1) + 1)^2 is 16 again at n = 20, gamma = 60 degrees.
     assert (20 / 2 * (math.cos(math.pi / 3) - 1) + 1) ** 2 == pytest.approx(16)
     cosine = np.linspace(1, -1, 4001)
@@ -215,12 +221,15 @@ def test_stiff_exponents():
             assert value[0] == 1
             assert (np.diff(value) <= 0).all()
             assert value[-1] >= 0
-            # exp alone has no zero: exp(-10) at 60 degrees.
+            # Only exp has no zero: it is exp(-10) at 60 degrees.
             assert n != 20 or (value[cosine <= 0.5] < (4.6e-5 if model == "exp" else 1e-6)).all()
 
 
 def test_stiff_normals_of_wrong_length():
-    """Cosines above 1 count as 1; a normal of length 0 is at a right angle; one of NaN stays NaN."""
+    """Cosines above 1 count as 1.
+
+    A normal of length 0 counts as at a right angle, and a normal of NaN stays NaN.
+    """
     for model in REFLECTION_MODELS:
         assert REFLECTION_MODELS[model].reflect(1 + 1 / 256, 1000) == 1
         assert REFLECTION_MODELS[model].reflect(0.0, 1000) == pytest.approx(0, abs=1e-300)
@@ -239,7 +248,7 @@ def test_phong_and_blinn_are_powers():
 def test_exponent_ratio():
     assert exponent_ratio(1.0) == 4
     assert exponent_ratio(math.cos(1e-6)) == pytest.approx(4, abs=1e-9)
-    # With n = ratio p both models agree at the angle: Phong sees twice Blinn's angle.
+    # With n = ratio p both models agree at the angle, because Phong's angle is twice Blinn's.
     for gamma in (1e-3, 0.05, 0.2, 0.3, 0.5, 0.7):
         ratio = exponent_ratio(math.cos(gamma))
         assert math.cos(gamma) ** (12 * ratio) == pytest.approx(math.cos(2 * gamma) ** 12, rel=1e-12)

@@ -20,7 +20,7 @@ from .scenes import BACKGROUND, LIGHTS, MATERIAL, SCENES, SEVERAL, ball, cast, c
 
 
 def phong_by_rays(scene, triangle, shares):
-    """Phong shading with Blinn's model, written out for one hit a pixel."""
+    """Phong shading with Blinn's model, computed for one hit of each pixel."""
     faces = scene.mesh.faces[triangle]
     normal = np.einsum("hwc,hwck->hwk", shares, scene.mesh.normals[faces])
     a, b, c = np.moveaxis(scene.mesh.vertices[faces], 2, 0)
@@ -59,9 +59,10 @@ def test_phong_against_ray_casting(name):
     frame = render(scene, "phong", BLINN, raster)
     triangle, shares = cast(scene)
     exact, normal = phong_by_rays(scene, triangle, shares)
-    # Corners are rounded to 1/256 pixel, so a pixel shows what lies up to 1/512 pixel away in x and y. Where
-    # the corners of a square of twice that size show the same triangle, the pixel must show it, with a color
-    # no further away than that of the square's corners.
+    # Corners are rounded to 1/256 pixel, so a pixel may show a point that is up to 1/512 pixel away in x and
+    # y. Take the square of twice this size around the pixel. If its corners show the same triangle, the pixel
+    # must show this triangle. Its colour must then be no further away than the colours of the square's
+    # corners.
     stable = np.ones(triangle.shape, dtype=bool)
     spread = np.zeros(exact.shape)
     turn = np.zeros(exact.shape)
@@ -80,7 +81,7 @@ def test_phong_against_ray_casting(name):
     found = found.reshape(triangle.shape)
     assert (found[stable] == triangle[stable]).all()
     assert (frame.mask == (found >= 0)).all()
-    # The light's edge makes one step of a highlight; no pixel stands within 1/256 pixel of it here.
+    # The light's edge makes one step of a highlight. No pixel is within 1/256 pixel of this edge.
     assert (np.abs(frame.image - exact) <= spread + 1e-9)[stable].all()
     surface = stable & (triangle >= 0)
     assert np.median(spread[surface]) < 0.5 / 255
@@ -103,8 +104,8 @@ def test_perspective_is_not_screen_linear():
     visible = np.flatnonzero(raster.visible)
     found = fragment_barycentrics(raster, visible)
     expected = shares.reshape(-1, 3)[raster.pixel[visible]]
-    # 1/256 pixel at the far end of the floor, 22 units away and 1 below: 22^2 / 1 units a focal length of 35
-    # pixels, over the floor's 20 units.
+    # 1/256 pixel at the far end of the floor, 22 units away and 1 below: 22^2 / 1 units over a focal length
+    # of 35 pixels, divided by the floor's 20 units.
     assert found == pytest.approx(expected, abs=22**2 / 35 / 20 / 256)
     assert (raster.magnitude_left > 0).all()
 
@@ -151,7 +152,7 @@ def test_slerp_and_span_curves():
     scene = SCENES["orthographic"]
     raster = rasterise(scene)
     phong = render(scene, "phong", BLINN, raster)
-    # In the orthographic projection vertex normals are linear along a span, but the ends were normalised.
+    # In the orthographic projection vertex normals are linear along a span, but the ends are normalised.
     normalised = shade_spans(scene, raster, "normalised", BLINN)
     slerp = render(scene, "slerp", BLINN, raster)
     assert (slerp.image == shade_spans(scene, raster, "slerp", BLINN)).all()
@@ -173,7 +174,7 @@ def test_slerp_and_span_curves():
 
 
 def one_span_a_line(left, right, lengths, direction=(0, 0, 1), n=20):
-    """A scene and its raster with one span a line, from the same left to the same right normal."""
+    """A scene and its raster with one span a line, from the same left normal to the same right normal."""
     lengths = np.asarray(lengths, dtype=np.int32)
     count = len(lengths)
     material = Material((0, 0, 0), (0, 0, 0), (1, 1, 1), n)
@@ -220,7 +221,10 @@ def test_stiff_spans_of_every_angle_and_length(degrees, curve):
 
 @pytest.mark.parametrize("n", [1, 2, 3, 10, 100, 500, 1000])
 def test_stiff_peak_and_pixels(n):
-    """The peak on a pixel, between two, and narrower than a pixel; the highlight inside one span."""
+    """The peak is on a pixel, between two pixels, and narrower than a pixel.
+
+    The highlight is inside a span.
+    """
     degrees = 60
     left, right = about_the_peak(degrees)
     lengths = [2, 3, 16, 17, 4095]
@@ -235,11 +239,11 @@ def test_stiff_peak_and_pixels(n):
             top = np.cos(nearest) ** n if model == "blinn" else max(1 - n * np.sin(nearest / 2) ** 2, 0) ** 2
             assert row.max() == pytest.approx(top, abs=1e-12)
             assert row == pytest.approx(row[::-1], abs=1e-12)
-    # At n = 1000 two pixels 60 degrees apart miss a highlight that the third, between them, shows whole.
+    # At n = 1000 two pixels 60 degrees apart miss a highlight. A third pixel between them shows it in full.
     if n == 1000:
         assert image[0].max() == 0
         assert image[1, :3] == pytest.approx([0, 1, 0], abs=1e-12)
-        # Inside the longest span: dark at both ends.
+        # The highlight is inside the longest span, which is dark at both ends.
         assert (image[4, [0, -1]] == 0).all()
         assert 0.05 < (image[4] > 0).mean() < 0.2
 
@@ -248,7 +252,7 @@ def test_stiff_opposite_normals_have_no_middle():
     scene, raster = one_span_a_line((1.0, 0.0, 0.0), (-1.0, 0.0, 0.0), [3])
     for curve in CURVES:
         image = shade_spans(scene, raster, curve, BLINN)
-        # 90 degrees at the ends; 0 in the middle but for the great circle, which goes round.
+        # 90 degrees at the ends; 0 in the middle, except for the great circle, which goes round.
         assert image[0, [0, 2]] == pytest.approx(np.zeros((2, 3)), abs=1e-300)
         if curve != "slerp":
             assert (image[0, 1] == 0).all()
@@ -256,7 +260,8 @@ def test_stiff_opposite_normals_have_no_middle():
 
 @pytest.mark.parametrize("shading", SHADINGS)
 def test_stiff_normals_of_no_length(shading):
-    """Vertex normals 0 give the face's own where normals are interpolated, the ambient term at a vertex."""
+    """Vertex normals of 0 give the face's own normal if normals are interpolated, and the ambient term at a
+    vertex."""
     mesh = ball()
     scene = scene_of(replace(mesh, normals=np.zeros_like(mesh.normals)), SCENES["perspective"].camera)
     raster = rasterise(scene)
@@ -266,7 +271,7 @@ def test_stiff_normals_of_no_length(shading):
     found, face = frame.reshape(-1, 3)[pixel], flat.reshape(-1, 3)[pixel]
     share_of_face = np.ones(len(visible))
     if shading in ("gouraud", "adaptive"):
-        # Equal, so that adaptive takes them for close.
+        # The normals are equal, so that adaptive takes them for close.
         share_of_face[:] = 0
     elif shading == "quadratic_gouraud":
         u, v, w = fragment_barycentrics(raster, visible).T
@@ -294,7 +299,8 @@ def test_every_shading_and_model(shading):
         assert 0 <= frame.image.min() <= frame.image.max() <= 1
         assert (frame.image[~frame.mask] == BACKGROUND).all()
         assert (frame.image[frame.mask] != BACKGROUND).any()
-    # A highlight differs from Blinn's by as much as the models do, times the specular of both lights.
+    # A highlight differs from Blinn's by the difference of the models, times the specular colours of both
+    # lights.
     bound = max(sum(light.color[c] for light in LIGHTS) * MATERIAL.specular[c] for c in range(3))
     if shading == "quadratic_gouraud":
         # The six weights add up to at most 5/3 in magnitude, in the middle of the triangle.
@@ -334,7 +340,10 @@ def test_empty_picture_and_refusals():
 
 
 def test_shade_operands():
-    """From N·L and N·H of every fragment as from its normal; each triangle with its own material."""
+    """Shading from N·L and N·H of every fragment gives the same as from its normal.
+
+    Each triangle has its own material.
+    """
     scene = SCENES["perspective"]
     mesh = replace(scene.mesh, material=np.arange(len(scene.mesh.faces)) % len(SEVERAL))
     scene = replace(scene, mesh=mesh, material=SEVERAL)
@@ -353,7 +362,8 @@ def test_shade_operands():
 @pytest.mark.parametrize("shading", SHADINGS)
 @pytest.mark.parametrize("model", ["blinn", "phong"])
 def test_each_triangle_has_its_own_material(shading, model):
-    """Pixel by pixel the picture in the one material of the triangle there."""
+    """Pixel by pixel the picture equals the picture in which all triangles have the material of the triangle
+    there."""
     mesh = ball()
     mesh = replace(mesh, material=np.random.default_rng(8).integers(0, 3, len(mesh.faces)))
     one = scene_of(ball(), Camera((2, 1, 3), (0, 0, 0)))
@@ -366,7 +376,7 @@ def test_each_triangle_has_its_own_material(shading, model):
     for index, material in enumerate(SEVERAL):
         alone = render(replace(one, material=material), shading, REFLECTION_MODELS[model])
         own = owner == index
-        # The same sums in another order of the pixels: float64 rounding only.
+        # The sums are the same in another order of the pixels, except for the rounding of float64.
         assert np.abs(given[own] - alone.image.reshape(-1, 3)[own]).max() < 1e-14
     assert (given[owner < 0] == BACKGROUND).all()
 

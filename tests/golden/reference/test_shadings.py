@@ -34,7 +34,7 @@ def test_flat():
 
 
 def corners_of(scene, raster):
-    """Visible fragments, and of each the normals at the corners as they are seen, and its shares of them."""
+    """Visible fragments. For each: the normals at the corners as they are seen, and its shares of them."""
     visible = np.flatnonzero(raster.visible)
     span = raster.span[visible]
     turn = np.where(raster.back[span], -1.0, 1.0)[:, np.newaxis, np.newaxis]
@@ -53,7 +53,8 @@ def test_gouraud():
 
 @pytest.mark.parametrize("name", ["perspective", "orthographic", "near plane"])
 def test_quadratic_gouraud_pixel_by_pixel(name):
-    """The quadratic through six colors of each face, in two barycentric coordinates, by a system of six."""
+    """The quadratic through six colours of each face, in two barycentric coordinates, by a system of six
+    equations."""
     scene = SCENES[name]
     raster = rasterise(scene)
     image = render(scene, "quadratic_gouraud", BLINN, raster).image.reshape(-1, 3)
@@ -63,7 +64,7 @@ def test_quadratic_gouraud_pixel_by_pixel(name):
     def powers(u, v):
         return np.stack([u**0, u, v, u * u, u * v, v * v], axis=-1)
 
-    # First, second, third corner, and the middles of the edges from each to the next.
+    # First, second and third corner, and the middles of the edges from each corner to the next.
     places = np.array([[1, 0, 0, 0.5, 0, 0.5], [0, 1, 0, 0.5, 0.5, 0]])
     polynomial = np.linalg.solve(powers(*places), color_by_hand(normalise(nodes), scene.camera.viewer))
     expected = np.einsum("fp,fpk->fk", powers(shares[:, 0], shares[:, 1]), polynomial)
@@ -72,9 +73,11 @@ def test_quadratic_gouraud_pixel_by_pixel(name):
 
 @pytest.mark.parametrize("projection", ["orthographic", "perspective"])
 def test_quadratic_gouraud_is_exact_for_quadratics(projection, monkeypatch):
-    """Corners on a circle about the z axis with normals along (x, y, 1): so are all the interpolated normals.
+    """Corners on a circle about the z axis with normals along (x, y, 1), so interpolated normals are of this
+    form, too.
 
-    The colors are made a polynomial of ``N_x/N_z = x`` and ``N_y/N_z = y``. Phong shading is exact for any.
+    The colours are made a polynomial of ``N_x/N_z = x`` and ``N_y/N_z = y``. For these colours both shadings
+    are exact.
     """
     angle = np.array([0.3, 2.2, 4.4])
     vertices = 0.8 * np.stack((np.cos(angle), np.sin(angle), np.zeros(3)), axis=1)
@@ -111,7 +114,7 @@ def test_quadratic_gouraud_is_nearer_to_phong():
 
 
 def test_quadratic_gouraud_stays_in_range():
-    """One lit corner, the other five nodes black: the polynomial falls to -1/8 of it along the edges."""
+    """One corner is lit, and the other five nodes are black. The polynomial falls to -1/8 along the edges."""
     normals = np.array([[0.0, 0, 1], [1, 0, 0], [0, 1, 0]])
     vertices = np.array([[0.0, 0, 0], [1, 0, 0], [0, 1, 0]])
     material = Material((0, 0, 0), (0, 0, 0), (1, 1, 1), 1000)
@@ -134,7 +137,7 @@ def test_middle_of_opposite_normals_is_the_face():
     mesh = Mesh(vertices, np.array([[0, 1, 2]]), normals)
     camera = Camera((0, 0, 3), (0, 0, 0), height=2.2)
     for direction in (0, 1):
-        # The second time seen from behind, with its normals negated.
+        # The second time the triangle is seen from behind, with its normals negated.
         turned = Mesh(vertices, mesh.faces[:, ::-1].copy(), -normals) if direction else mesh
         scene = scene_of(turned, camera, 40, 40)
         raster = rasterise(scene)
@@ -153,7 +156,7 @@ def test_middle_of_opposite_normals_is_the_face():
 
 
 def close_by_hand(scene, normal, highlight, diffuse):
-    """Faces whose vertices differ by less than the thresholds, one comparison after the other."""
+    """Faces whose vertices differ by less than the thresholds, by three comparisons."""
     result = []
     for face in scene.mesh.faces.tolist():
         close = True
@@ -188,7 +191,8 @@ def test_triangles_for_gouraud(thresholds):
 
 
 def test_normals_far_apart_are_not_close():
-    """The trap of appendix В: on a cone about L = V = H the cosines are equal, and the normals far apart."""
+    """This is the fault of appendix В: on a cone about L = V = H the cosines are equal, and the normals far
+    apart."""
     turn = np.array([0, 2, 4]) * np.pi / 3
     for degrees, close in ((0, True), (20, True), (40, False)):
         slope = np.radians(degrees)
@@ -228,9 +232,11 @@ def test_adaptive_takes_each_triangle_from_one_method():
 
 
 def test_default_thresholds_are_narrow():
-    """What passes them differs from Phong by little: N·L by 0.008, the highlight by n times 0.004.
+    """A face within the thresholds differs little from Phong: by 0.008 in N·L, and by n times 0.004 in the
+    highlight.
 
-    Between vertices 1.3 degrees apart N·H and N·L may rise over their ends by ``1 - cos 0.65`` degrees, 7e-5.
+    Between vertices 1.3 degrees apart N·H and N·L may exceed the values at both ends by ``1 - cos 0.65``
+    degrees, 7e-5.
     """
     scene = scene_of(ball(500, 300), SCENES["orthographic"].camera)
     raster = rasterise(scene)
@@ -243,5 +249,5 @@ def test_default_thresholds_are_narrow():
         * (diffuse * MATERIAL.diffuse[c] + specular * MATERIAL.specular[c])
         for c in range(3)
     )
-    # A light's edge is a step of a highlight; none is crossed by a visible triangle of Gouraud here.
+    # A light's edge is a step of a highlight. No visible triangle of Gouraud shading crosses an edge here.
     assert 0 < np.abs(adaptive.image - phong.image).max() < worst

@@ -12,7 +12,7 @@ IMAGE = RNG.random((4, 8, 3))
 
 
 def texel(index, size, wrap):
-    """Index of a texel by a walk over the tiles of an image."""
+    """Index of a texel, found by walking over the tiles of an image."""
     tile, inside = divmod(index, size)
     if wrap == "clamp":
         return 0 if tile < 0 else size - 1 if tile > 0 else inside

@@ -9,7 +9,7 @@ from blysk.golden.reference.transfer import LARGEST_SLOPE, TRANSFERS, color_of_t
 def test_values_of_the_standard():
     """Ends, the joint of line and power, and codes of a mid grey, as tables of sRGB print them."""
     np.testing.assert_allclose(encode([0, 0.0031308, 1]), [0, 0.04045, 1], atol=1e-7)
-    # A fifth of the light is a code of 124, and the code 188 half of the light.
+    # A fifth of the light has the code 124, and half of the light the code 188.
     assert np.round(255 * encode([0.2, 0.5, 0.214041])).tolist() == [124, 188, 127]
     np.testing.assert_allclose(
         decode(np.array([10, 11, 128, 188]) / 255), [0.003035, 0.003347, 0.215861, 0.502886], atol=1e-6
@@ -24,7 +24,7 @@ def test_decode_is_the_inverse():
 
 
 def test_texts_of_colours():
-    """Codes of sRGB are decoded, numbers are linear light."""
+    """Codes of sRGB are decoded, and numbers are linear light."""
     assert color_of_text("#ff8000") == pytest.approx([1, 0.215861, 0], abs=1e-6)
     assert color_of_text("#FFFFFF") == [1, 1, 1]
     assert color_of_text("0.5") == [0.5, 0.5, 0.5]
@@ -47,7 +47,7 @@ def test_linear_light_stays():
 
 
 def test_slope_is_the_largest_of_all_brighter_light():
-    """Against differences; it never rises, so that the least light has the largest slope."""
+    """The slope is compared with differences. It never rises, so the least light has the largest slope."""
     light = np.r_[np.linspace(0, 0.01, 400), np.linspace(0.011, 1, 400)]
     found = np.array([slope(x) for x in light])
     assert found[0] == LARGEST_SLOPE
