@@ -155,7 +155,7 @@ class Whole(Value):
         return int(text) if re.fullmatch(r"[+-]?[0-9]{1,18}", text) else text
 
     def check(self, value: Any) -> Any:
-        """An `int` in the range."""
+        """The value as an `int`, within the range."""
         if isinstance(value, bool) or not isinstance(value, int):
             raise ValueError("not a whole number")
         if not self.least <= value <= self.most:
@@ -176,7 +176,7 @@ class Few(Whole):
         return f"[{'|'.join(map(str, self.numbers))}]"
 
     def check(self, value: Any) -> Any:
-        """An `int` among the few numbers."""
+        """The value as an `int`, one of the few numbers."""
         if super().check(value) not in self.numbers:
             raise ValueError("not one of the choices")
         return value
@@ -196,7 +196,7 @@ class Number(Value):
         return _floats(text, "not a number")[0] if "," not in text else text
 
     def check(self, value: Any) -> Any:
-        """A `float` in the range."""
+        """The value as a `float`, within the range."""
         return _finite(value, self.least, self.most)
 
 
@@ -215,11 +215,11 @@ class Vector(Value):
         return self.remedy.replace(f"give {self.name}", f'give {self.kind} or "{self.name}"', 1)
 
     def parse(self, text: str) -> Any:
-        """Numbers separated by commas."""
+        """The numbers of a text, which are separated by commas."""
         return _floats(text, f"not {self.kind}")
 
     def check(self, value: Any) -> Any:
-        """A tuple of `float`."""
+        """The value as a tuple of `float`."""
         if not isinstance(value, list | tuple) or len(value) not in self.counts:
             raise ValueError(f"not {self.kind}")
         vector = tuple(_finite(part) for part in value)
@@ -247,14 +247,14 @@ class Color(Value):
         return self.remedy.replace("#rrggbb", '"#rrggbb"')
 
     def parse(self, text: str) -> Any:
-        """The channels, see `color_of_text`."""
+        """The channels that a text stands for, see `color_of_text`."""
         try:
             return color_of_text(text)
         except ValueError:
             raise ValueError("not a colour") from None
 
     def check(self, value: Any) -> Any:
-        """Three numbers of type `float`."""
+        """The value as three numbers of type `float`."""
         channels = value if isinstance(value, list | tuple) else [value] * 3
         if len(channels) != 3:
             raise ValueError("not a colour")
@@ -270,12 +270,12 @@ class Size(Value):
     in_file = f'give [width, height] or "WIDTHxHEIGHT", 1 to {LARGEST_SIDE} each'
 
     def parse(self, text: str) -> Any:
-        """Two numbers with an x between them."""
+        """Width and height, from a text with an x between two numbers."""
         match = re.fullmatch(r"([0-9]{1,9})x([0-9]{1,9})", text)
         return [int(match[1]), int(match[2])] if match else text
 
     def check(self, value: Any) -> Any:
-        """Two numbers of type `int`."""
+        """The value as two numbers of type `int`."""
         if not isinstance(value, list | tuple) or len(value) != 2:
             raise ValueError("not a size")
         side = Whole(1, LARGEST_SIDE)
@@ -290,7 +290,7 @@ class Truth(Value):
     in_python = "give True or False"
 
     def check(self, value: Any) -> Any:
-        """A `bool`."""
+        """The value as a `bool`."""
         if not isinstance(value, bool):
             raise ValueError("neither true nor false")
         return value
@@ -313,11 +313,11 @@ class Choice(Value):
         self.remedy = f"use one of {', '.join(self.names)}"
 
     def get_metavar(self, param: click.Parameter, ctx: click.Context | None = None) -> str:
-        """The names."""
+        """Placeholder in the help text: the names."""
         return f"[{'|'.join(self.names)}]"
 
     def check(self, value: Any) -> Any:
-        """The name."""
+        """The value: one of the names."""
         if not isinstance(value, str) or value not in self.names:
             raise ValueError("unknown")
         return value
@@ -332,19 +332,19 @@ class Several(Choice):
 
     @property
     def in_python(self) -> str:
-        """A text, or a list of names."""
+        """`remedy` for Python, which also takes a list of names."""
         return f"{self.remedy}, as a list or with commas between them"
 
     def get_metavar(self, param: click.Parameter, ctx: click.Context | None = None) -> str:
-        """The names, as many as wanted."""
+        """Placeholder in the help text: the names, as many as wanted."""
         return f"[{'|'.join(self.names)}],..."
 
     def parse(self, text: str) -> Any:
-        """The names between the commas."""
+        """The names of a text, which are separated by commas."""
         return [name.strip() for name in text.split(",")]
 
     def check(self, value: Any) -> Any:
-        """A tuple of the names, in the order of ``names``."""
+        """The value as a tuple of names, in the order of ``names``."""
         if not isinstance(value, list | tuple) or not value:
             raise ValueError("unknown")
         given = [super(Several, self).check(name) for name in value]
@@ -357,7 +357,7 @@ class OutputFile(click.Path):
     """Name of a file to write. An empty name, as from a shell variable that is not set, is refused."""
 
     def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
-        """The name."""
+        """The name of the file, if it is not empty."""
         if not value:
             raise InputError(
                 f"{param.opts[-1]} ''", "is not a file name", "give a file name, or leave the option out"

@@ -58,7 +58,7 @@ def errors_of(candidate: Mapping[str, Any], view: Mapping[str, Any], exponent: i
     -------
     dict
         ``errors``: for each of `ERRORS` ``max_lsb``, ``p999_lsb`` and ``rmse_lsb``;
-        ``out_of_range_spans``: number of spans that are too wide for the design, whose pixels may be wrong;
+        ``out_of_range_spans``: number of spans that are too wide for the design. Their pixels may be wrong;
         ``lengths``: pairs of a length and the number of spans that have it.
     """
     tried = Candidate(**candidate)

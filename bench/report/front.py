@@ -85,7 +85,7 @@ def _summary(label: str, point: Mapping[str, Any], samples: Sequence[tuple]) -> 
 
 
 _ALIKE_LSB, _ALIKE_TIMES = 0.15, 1.05
-"""Difference of errors, in LSB, and ratio of times, up to which two designs count as equal."""
+"""Two designs count as equal up to this difference of errors, in LSB, and up to this ratio of times."""
 
 _LEAST_LSB = 1e-2
 """Smallest drawn error."""
@@ -136,7 +136,7 @@ def conclusion(found: Sequence[Mapping[str, Any]]) -> Conclusion | None:
     if prepared:
         sentence += (
             f". `{prepared[0]['label']}` takes {_costs(prepared[0])}. Its spans bring dot products at three "
-            "points, whose computation is not counted"
+            "points. The computation of these dot products is not counted"
         )
     mirrors = _cheapest_first(of for of in timed if of["is_mirror"])
     if mirrors:

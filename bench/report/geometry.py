@@ -1,6 +1,6 @@
 """The report's section on triangles: whole designs compared, from triangles to pixels, and stiff cases.
 
-The first method is ``quotient``. A span brings a vector and the step of the vector. ``quotient`` has two
+The first method is ``quotient``. Its spans bring a vector and the step of the vector. ``quotient`` has two
 rivals. ``quadratic`` needs unit normals at the ends of each span. ``renormalise`` takes the unchanged line
 between the ends, and normalises at every pixel.
 """

@@ -105,7 +105,7 @@ def cases_of(quick: bool) -> Iterator[tuple[str, Scene]]:
     rng = np.random.default_rng(23)
     for parts in (256, 32, 2):
         yield f"slivers of 1/{parts} pixel", _slivers(rng, 1 / parts)
-    yield "area of a step of the grid, squared", _smallest(rng)
+    yield "triangles between neighbouring points of the grid", _smallest(rng)
     yield "one triangle over the whole guard band", _scene(4095, 9, *_largest(np.full((3, 3), _UP)))
     yield "4095 columns, normals 60 degrees apart, exponent 1000", _scene(4095, 9, *_largest(_fan(60)), 1000)
     yield "crossing surfaces, depths at both ends of the range", _crossing()

@@ -104,8 +104,8 @@ def operations(way: str, local: bool) -> dict[str, float]:
     way : str
         One of `WAYS`.
     local : bool
-        Whether every pixel has its own L and V. Else L, V, L·V and H are computed once a frame, and nearly
-        do not count.
+        Whether every pixel has its own L and V. Else L, V, L·V and H are computed once a frame, so they add
+        almost nothing to a pixel.
 
     Returns
     -------

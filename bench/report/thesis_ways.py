@@ -169,10 +169,11 @@ WAYS: dict[str, Way] = {
     "a cosine of each angle": _cosines_by_angles,
     "recurrence": _recurrence,
 }
-"""Ways to the normals, or to N·L and N·H, of a span's pixels, as functions of both ends, (L, H) and pixels.
+"""Ways by name. A way computes, for the pixels of spans, either the normals, or N·L and N·H.
 
-Vectors are arrays of shape (3, spans) or (3, 1). A way yields an array for each pixel in turn: normals, shape
-(3, spans), or N·L and N·H, shape (2, spans).
+A way is a function of the left ends, the right ends, (L, H) and the number of pixels. Vectors are arrays of
+shape (3, spans) or (3, 1). A way yields an array for each pixel in turn. The shape is (3, spans) for normals,
+and (2, spans) for N·L and N·H.
 """
 
 

@@ -126,7 +126,7 @@ class Built:
     bitstream : bytes
         Bitstream that the FPGA loads.
     words : int
-        Number of memory words that were read back from the bitstream. All of them were equal.
+        Number of memory words that were read back from the bitstream. All were equal to the written words.
     """
 
     parts: dict[str, tuple[int, int]]
@@ -345,7 +345,7 @@ def _pack(runner: ToolRunner, folder: Path, configuration: str) -> int:
     Returns
     -------
     int
-        Number of memory words, all of them equal.
+        Number of memory words. All words that were read back are equal to the written words.
     """
     steps = (
         ("ecppack", configuration, "--bit", "top.bit"),

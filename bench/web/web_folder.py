@@ -14,7 +14,7 @@ from blysk.sim.run_files import reads
 __all__ = ["MARK", "PAGE", "check_extras", "check_folder", "earlier", "folders_of", "report_files"]
 
 MARK, PAGE = "site.json", "index.html"
-"""Two files of a site: the mark, which tells that this program wrote the site, and the first page."""
+"""Two files of a site: the mark and the first page. The mark tells that this program wrote the site."""
 
 _EXTRAS = ("ziglang", "jinja2", "markdown_it", "flip_evaluator", "skimage")
 

@@ -50,7 +50,7 @@ class Lights(Value):
         )
 
     def check(self, value: Any) -> Any:
-        """A tuple of `Light`."""
+        """The value as a tuple of `Light`."""
         entries = [value] if isinstance(value, Light | Mapping | str) or _is_numbers(value) else value
         if not isinstance(entries, list | tuple):
             raise ValueError("not a light")

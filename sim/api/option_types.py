@@ -28,7 +28,7 @@ class ReflectionOption(Choice):
         return f"[{'|'.join(self.names)}|FILE.csv]"
 
     def check(self, value: Any) -> Any:
-        """The name, or the curve that the file holds."""
+        """The value: the name of a model, or the curve that the file holds."""
         if isinstance(value, TabulatedModel):
             return value
         if not isinstance(value, str) or not value.lower().endswith(".csv"):
@@ -49,7 +49,7 @@ class Roughness(Number):
         self.remedy = "give a number greater than 0 and at most 1"
 
     def check(self, value: Any) -> Any:
-        """A `float` in the range."""
+        """The value as a `float`, within the range."""
         value = super().check(value)
         if not value:
             raise ValueError("out of range")
@@ -81,11 +81,11 @@ class Direction(Vector):
         return self.metavar
 
     def parse(self, text: str) -> Any:
-        """A word as it is, or numbers with commas between them."""
+        """The direction that a text stands for: a word as it is, or numbers with commas between them."""
         return text if text in self.words else super().parse(text)
 
     def check(self, value: Any) -> Any:
-        """A tuple of `float`, or a word whose vector depends on other options."""
+        """The value: a tuple of `float`, or a word whose vector depends on other options."""
         if isinstance(value, str) and value in self.words:
             return self.words[value]
         return super().check(value)

@@ -62,8 +62,8 @@ def scene(source: Source = "teapot", **options: Unpack[SceneOptions]) -> Scene:
         Front is (0, 0, 1), or (0, -1, 0) if ``up`` is z. Right is the cross product of up and front. If no
         option of the camera is given, the camera of a glTF file is used.
     position, target : three floats
-        Position of the camera, which replaces ``view``, and the point in the middle of its picture. The
-        default of ``target`` is the middle of the mesh. Both are in the mesh's units.
+        Position of the camera, and the point in the middle of its picture. ``position`` replaces ``view``.
+        The default of ``target`` is the middle of the mesh. Both are in the mesh's units.
     up : three floats or {"x", "y", "z"}
         Direction that points up in the picture, by default y for all formats. STL files often need z.
     field_of_view : float

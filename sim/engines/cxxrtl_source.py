@@ -1,4 +1,7 @@
-"""The C++ of a component: netlist by Amaranth, class by Yosys' CXXRTL, rewritten, and the driver's macros."""
+"""The C++ of a component, and the macros of the driver.
+
+Amaranth writes the netlist. Yosys' CXXRTL makes a C++ class of it. Modules of this folder rewrite the class.
+"""
 
 import contextlib
 import gc

@@ -57,7 +57,7 @@ class Ports:
         If ``component`` is not a `Component`.
     ValueError
         If stream ``i`` or ``o`` is missing, a member is of another kind, or a stream's payload has no bits.
-        If there is another input, or another member with a signature, which no engine drives.
+        If there is another input, or another member with a signature. No engine drives these members.
     """
 
     def __init__(self, component: Component):

@@ -365,7 +365,7 @@ def expressions_of(
     text : str
         C++ of the expressions.
     variables : dict
-        Kind, ``value`` or ``wire``, and width of each variable, by its name.
+        Kind (``value`` or ``wire``) and width of each variable, by its name.
 
     Returns
     -------

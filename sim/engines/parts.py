@@ -105,7 +105,10 @@ class _Reader:
         yield f"\t{name}{place} = {value};"
 
     def _sources(self, source: str, start: int, low: int, high: int) -> Iterator[_Part]:
-        """Parts of a word, whose bits ``low`` to ``high`` become the bits of ``source`` from ``start`` on."""
+        """Parts of a word whose bits ``low`` to ``high`` equal bits of ``source``, from bit ``start`` on.
+
+        If all sources of these bits of ``source`` are known, the parts name these sources.
+        """
         known = self.parts.get(source, ())
         stop = start + high - low
         inside = [part for part in known if part.high >= start and part.low <= stop]

@@ -140,7 +140,7 @@ def probes_of(unit: ShadingPipelineUnit) -> list[Probe]:
 
 
 def _part(fragment: Fragment, path: str) -> Fragment | None:
-    """Submodule by its path, whose names have dots between them. ``None`` if there is no such submodule."""
+    """Submodule by its path: names with dots between them. ``None`` if no submodule has this path."""
     for name in path.split("."):
         inside = [part for part, own, *_ in fragment.subfragments if own == name]
         if not inside:

@@ -108,7 +108,7 @@ def count_toggles(
 
 
 def _registers(fragment: Fragment, path: str = "top") -> dict[str, list[Value]]:
-    """Registers, and registered read data of memories, of a fragment and its submodules, by path."""
+    """Registers of a fragment and its submodules, by path. Registered read data of a memory is a register."""
     registers: list[Value] = []
     for domain, statements in fragment.statements.items():
         if domain != "comb":

@@ -1,4 +1,4 @@
-"""A pipeline with a test memory of texels outside of it, which answers late."""
+"""A pipeline whose texels are in a test memory outside of the pipeline. The test memory answers late."""
 
 from amaranth.hdl import Cat, Module, Signal
 from amaranth.lib import wiring

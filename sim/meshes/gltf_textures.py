@@ -147,8 +147,11 @@ class GltfTextures:
         info : dict
             From `color_texture`.
         alpha : {"told", "left out", "read"}
-            Whether alpha is recorded as not read, does not count, or is read. With "left out" the texels are
-            those of a texture with alpha.
+            What becomes of the alpha of the image:
+
+            - "told": it is recorded as not read;
+            - "left out": the image is read with its alpha, and the alpha is then removed without a record;
+            - "read": it is kept.
 
         Raises
         ------
@@ -219,7 +222,7 @@ class GltfTextures:
         return load_texture(data, name, self._found, **options)
 
     def _target(self, uri: str) -> Path | None:
-        """The file of an image. ``None`` if the file is missing or outside the folder, which is recorded."""
+        """The file of an image. ``None``, and a record, if the file is missing or outside the folder."""
         why = OUTSIDE
         try:
             target = inside(self._folder, uri, unquote(uri))

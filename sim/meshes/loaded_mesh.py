@@ -36,8 +36,8 @@ class LoadedMesh:
     name : str
         ``teapot``, or the file's name without folder and suffix.
     repaired_normals : int
-        Stored vertex normals that were zero, not finite, or more than 1/256 off unit length, or that the
-        file refers to but does not hold.
+        Number of stored vertex normals that were repaired. A repaired normal was zero, was not finite, was
+        more than 1/256 off unit length, or was missing although the file refers to it.
     dropped_faces : int
         Dropped triangles without area: two corners are at the same position, or no triangle shares a side.
         Other triangles without area stay, because they close the seam between a side and its parts.

@@ -71,7 +71,7 @@ class ObjImage(NamedTuple):
     """Options that are not read."""
 
     def placed(self, coordinates: np.ndarray) -> np.ndarray:
-        """Texture coordinates for `Texture`, from those of the file, where v is 0 at the lower border."""
+        """Coordinates for `Texture`, from coordinates of the file. In the file v is 0 at the lower border."""
         placed: np.ndarray = coordinates * self.scale + self.offset
         return np.column_stack([placed[:, 0], 1 - placed[:, 1]])
 

@@ -219,8 +219,8 @@ def _positions(data: bytes, found: Found, painted: bool) -> tuple[bytes, np.ndar
 
     - 1: a weight;
     - 3: red, green, blue;
-    - 4: red, green, blue, alpha, or a weight, red, green, blue. The first is the weight if it is always 1
-      and the last is not;
+    - 4: either red, green, blue and alpha, or else a weight, red, green and blue. The first number is the
+      weight if it is 1 for all positions and the last number is not;
     - 5: a weight, red, green, blue, alpha.
     """
     wrong = rb"^(?:v (?!%b(?:[ \t]++%b){0,5}+%b)|vn (?!%b%b))([^\n]*)" % (_THREE, _NUMBER, _END, _THREE, _END)

@@ -79,7 +79,7 @@ def _edges(unit, rng, count):
         return np.where(falls, -1, 1) * step.astype(np.int64)
 
     def span(begin, last, edge, falls, deepest):
-        """The span from pixel ``begin`` to ``last``, whose deepest or nearest depth is ``edge``."""
+        """The span from pixel ``begin`` to ``last``. Its deepest or nearest depth is ``edge``."""
         at, other = np.where(falls == deepest, (begin, last), (last, begin))
         step = line(edge, at, other, falls)
         return begin, last - begin + 1, edge - step * (at - begin), step

@@ -132,7 +132,7 @@ def _spans(unit, rng, count, exponent=EXPONENT):
 
 
 def _any(unit, rng, count):
-    """Spans near the threshold, with another exponent in each run: a power of two, the largest, or any."""
+    """Spans near the threshold. Each run has another exponent: a power of two, the largest or any."""
     return _spans(unit, rng, count, any_exponent(rng))
 
 

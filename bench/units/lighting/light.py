@@ -91,7 +91,7 @@ def _operands(unit, rng, count, exponent=None):
 
 
 def _exponents(unit, rng, count):
-    """Any operands, with another exponent in each run: a power of two, the largest, or any."""
+    """Any operands, with another exponent in each run: a power of two, the largest or any exponent."""
     return _operands(unit, rng, count, any_exponent(rng))
 
 

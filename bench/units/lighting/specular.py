@@ -49,7 +49,7 @@ def measure_highlights(rng, count, model):
 
 
 def any_exponent(rng) -> int:
-    """An exponent: a power of two, the largest, or any."""
+    """An exponent: a power of two, the largest exponent, or any exponent."""
     return int(rng.choice([1 << rng.integers(10), 1000, rng.integers(1, 1001)], p=[0.45, 0.1, 0.45]))
 
 
@@ -81,7 +81,7 @@ def highlights(unit, rng, count, exponent=None):
 
 
 def exponent_bits(unit, rng, count):
-    """Operands with another exponent in each run: a power of two, the largest, or any."""
+    """Operands with another exponent in each run: a power of two, the largest or any exponent."""
     return highlights(unit, rng, count, any_exponent(rng))
 
 
@@ -199,7 +199,7 @@ RECORD = Record(
     axis="n (1 - cos γ)",
     logarithmic=True,
     still={
-        "a slope is n/2, and n of 10 bits, normalised to 17 bits, ends in seven zeros": (
+        "a slope is n/2 with n of 10 bits, normalised to 17 bits, so it ends in seven zeros": (
             "datapath.slope.slope_word[0-16] datapath.slope.scale[0-6] datapath.product[0-6]"
         ),
         "the exponent is constant in a run, so no bit of its slope and boundary falls": (

@@ -36,7 +36,7 @@ def test_cases(cases, method):
         assert case["sliver"] or case["error"] < 0.6
         assert (case["zero"] > 0) == (case["name"] == "a normal and its opposite")
     by_name = {case["name"]: case for case in cases[method]}
-    assert by_name["area of a step of the grid, squared"]["pixels"] == 400
+    assert by_name["triangles between neighbouring points of the grid"]["pixels"] == 400
     assert by_name["10,000 triangles of half a pixel to a pixel"]["triangles"] == 10_000
     assert by_name["two triangles in the same place"]["hidden"] == 13_050
 
