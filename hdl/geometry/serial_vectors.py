@@ -13,7 +13,7 @@ from blysk.golden.geometry.surface_words import SurfaceWords
 from blysk.golden.geometry.triangles import ATTRIBUTES, PIXEL_BITS
 from blysk.golden.geometry.vector_adapter import VectorAdapter
 from blysk.hdl.core.bits import select
-from blysk.hdl.core.views import copy
+from blysk.hdl.core.views import copy, copy_fields
 from blysk.hdl.geometry.span_attributes import whole_span_shape
 from blysk.hdl.geometry.span_halver import is_apart, is_kept, shorter, size_of
 from blysk.hdl.geometry.surface_words import (
@@ -393,5 +393,5 @@ class SerialVectorsUnit(wiring.Component):
             Value.cast(result.start).eq(Cat(ring[:count])),
             Value.cast(result.step).eq(Cat(ring[count:])),
             result.exponent.eq(exponent),
-            *(Value.cast(result[name]).eq(Value.cast(word)) for name, word in held.items()),
+            *copy_fields(result, held, held),
         ]

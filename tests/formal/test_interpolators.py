@@ -161,8 +161,7 @@ def line_stretches(unit) -> Iterator[Stretch]:
 
 
 def quadratic_stretches(unit) -> Iterator[Stretch]:
-    """Stretches of a method with a preparation and lengths beside it, followed by the stretches of a
-    curve."""
+    """Stretches of a method with a preparation, lengths beside it, and then a curve."""
     setup = unit._setup
     yield Stretch(unit.i, setup.i, left, constant_coefficient, held(unit._middle, unit._gpq))
     yield from curve_stretches(unit, setup.i, constant_coefficient)
@@ -178,8 +177,7 @@ def evaluator_stretches(unit) -> Iterator[Stretch]:
 
 
 def spans_stretches(unit, sink=None) -> Iterator[Stretch]:
-    """Stretches of a method with a setup, accumulators, and starts, lengths and decisions beside the
-    setup."""
+    """Stretches of accumulators and a setup, with starts, lengths and decisions beside the setup."""
     capacity = unit.starts_inside * ((1 << LENGTH_BITS) - 1) + pixels_held(unit._accumulator)
     yield Stretch(unit.i, sink or unit.o, value, cosine, capacity)
 
@@ -295,10 +293,7 @@ def tells_length(harness: Harness) -> None:
 
 
 def of_pairs() -> Harness:
-    """Claim that a span of two pixels becomes two spans of one pixel, with the values at its ends.
-
-    Any other span passes unchanged.
-    """
+    """Claim that only a span of two pixels changes: to two spans of a pixel, with the values at its ends."""
     h = Harness(unit := LocalChordInterpolatorUnit(LocalChordInterpolator(), 1, **OPTIONS))
     given, spans, long = unit.i, unit._spans.i, unit._spans.long
     came, goes, pair = given.payload, spans.payload, given.payload.length == 2
@@ -325,10 +320,7 @@ def of_stretch(name: str, place: int) -> Harness:
 
 
 def of_cycles(name: str, *, exact: bool = False) -> Harness:
-    """Claims on spans of one pixel or more, on all stretches together.
-
-    Beats are counted, or followed exactly.
-    """
+    """Claims on spans of a pixel or more, on all stretches. Beats are counted, or followed exactly."""
     make, stretches = UNITS[name]
     h = Harness(unit := make())
     h.assume(unit.i.payload.length != 0)
@@ -366,10 +358,8 @@ STRETCHES = {
 
 
 BOUNDED = {"chord_spans": 14}
-"""Cycles from power-up, for FIFOs beside a setup, which are not decided in time for runs of any length.
-
-These cycles take 15 seconds of a processor; each further cycle more than doubles the time.
-"""
+"""Cycles from power-up, for FIFOs beside a setup, which are not decided in time for runs of any length. They
+take 15 seconds of a processor; each further cycle more than doubles the time."""
 
 JOINED = (("chord_spans", 0),)
 """The stretches with these FIFOs."""
@@ -394,8 +384,7 @@ def test_pixels(prove, name, place):
 
 @pytest.mark.parametrize("name", [pytest.param(name, marks=marks_of(name)) for name in UNITS])
 def test_stability_and_progress(prove, name):
-    """By induction (except `BOUNDED`), for spans of 1 to 3 pixels: no beat is stuck, and a beat that waits
-    does not change.
+    """By induction (except `BOUNDED`), for spans of 1 to 3 pixels: no beat is stuck, no waiting beat changes.
 
     While the output is ready, a pixel leaves, or an offered span is taken, within the latency and one cycle.
     If a FIFO stands beside a setup, a span may wait some cycles longer.
@@ -403,8 +392,7 @@ def test_stability_and_progress(prove, name):
     prove(of_cycles(name), BOUNDED.get(name))
 
 
-# For each bug: the unit whose claims it refutes, the text where it is injected, and the bug. The method is
-# named if it is not the usual method.
+# For each bug: unit whose claims it refutes, text where it is injected, bug, and method if it is not usual.
 BUGS = {
     "any span is taken in": ("linear", "setup.i.valid.eq(self.i.valid)", "setup.i.valid.eq(1)"),
     "spans are lost at the input": ("linear", "self.i.ready.eq(setup.i.ready)", "self.i.ready.eq(1)"),

@@ -143,8 +143,9 @@ def test_a_design_refuses_what_it_does_not_show():
     tinted = replace(colored, material=(replace(GLOSSY, tinted=True),))
     with pytest.raises(ValueError, match=r"^the scene has a tinted material, and the design does not: make"):
         prepare(tinted, of_colors)
-    with pytest.raises(ValueError, match=r"^the albedo of the design is perspective, and the camera is not"):
-        prepare(scene_of(patch(colors=True), projection="orthographic"), of_colors)
+    flat = design_for(preset("quotient", "blinn"), scene_of(patch(colors=True), projection="orthographic"))
+    with pytest.raises(ValueError, match=r"^the albedo of the design is orthographic, and the camera is not"):
+        prepare(colored, flat)
     spans = prepare(colored, of_colors).spans
     with pytest.raises(ValueError, match=r"^the design has an albedo, and the spans lack attributes$"):
         of_colors.compute(replace(spans, attributes=None), constants_of(colored, of_colors))

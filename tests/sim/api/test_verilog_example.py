@@ -50,7 +50,7 @@ def test_table_of_quotients_follows_from_the_text(model):
     assert ("s = (1 - R.V)/2" if model == "phong" else "s = 1 - (N.H)^2") in text
     table = design.specular.table(EXPONENT).writes(0)["value"][1:]
     cosine_of = {"phong": [lambda s: 1 - 2 * s], "blinn": [lambda s: np.sqrt(1 - s), np.sqrt]}[model]
-    assert len(cosine_of) == 1 + any("function of c = (N.H)^2 in place of s" in line for line in lines)
+    assert len(cosine_of) == 1 + any("function of c = (N.H)^2, in the same " in line for line in lines)
     for part, cosine in enumerate(cosine_of):
         for row, step in ((15, 0), (12, 3), (3, 15), (0, 8)):
             s = (1 + step / 16) * 2.0 ** (row - 16) if row else step / 16 * 2.0**-15

@@ -303,7 +303,7 @@ def test_combinational_feedback_is_refused():
             return m
 
     with pytest.raises(
-        SimulationError, match=r"^Yosys: Design contains feedback wires.* give each its own signal"
+        SimulationError, match=r"^Yosys: Design contains feedback wires.* give each field its own signal"
     ):
         simulate(Tangled(), BEATS, count=4)
     assert len(simulate(Tangled(), BEATS, count=4, engine="pysim").beats) == 4
