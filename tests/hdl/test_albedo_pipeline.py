@@ -37,7 +37,7 @@ VARIANTS = [
 
 @pytest.mark.parametrize("variant", VARIANTS)
 def test_equals_model(variant):
-    """Under stalls; the long run has more spans of each."""
+    """Under stalls. The long run has more spans of each variant."""
     unit, rng = RECORD.variants[variant].unit(), np.random.default_rng(2)
     stalls = {name: rng.random(97) < 0.3 for name in ("input_stalls", "output_stalls")}
     case = RECORD.stimuli["spans"].make(unit, rng, 120)
@@ -46,7 +46,7 @@ def test_equals_model(variant):
 
 @pytest.mark.long
 def test_texels_outside():
-    """Answers come after random numbers of cycles: the same pixels."""
+    """Answers of the memory come after random numbers of cycles, and the pixels are the same."""
     design = RECORD.variants["albedo, both, without lights, 2 materials"].unit().model
     texture = TextureSampler(TexelMemory(104, external=True))
     unit = PipelineWithTexels(replace(design, albedo=replace(design.albedo, texture=texture)))
@@ -81,7 +81,7 @@ def test_an_albedo_of_triangles_is_refused_where_geometry_does_not_serve_it():
 
 
 def test_a_pipeline_without_albedo_has_nothing_of_it():
-    """No port, no unit, no word of a constant; the baselines hold its cells."""
+    """It has no port, no unit and no constant of an albedo. The baselines check its cells."""
     text = rtlil.convert(ShadingPipelineUnit(preset("linear", "cosquad")), name="top", emit_src=False)
     found = re.search(r"albedo|attributes|emission|texel|texture|tinted|colored|word_(8|9|1[0-5])\b", text)
     assert found is None
@@ -96,7 +96,10 @@ def cycles_of(unit, lengths):
 
 
 def test_albedo_costs_no_cycle():
-    """Spans follow each other as without it; the first pixel comes later by the latency of the units."""
+    """Spans follow each other as without an albedo.
+
+    The first pixel comes later by the latency of the units.
+    """
     lengths = [5, 40, *range(1, 12), *[1] * 30, 60, 1, 1, 2, 3]
     design = RECORD.variants["albedo"].unit().model
     units = ShadingPipelineUnit(preset("quotient")), ShadingPipelineUnit(design)
@@ -106,7 +109,7 @@ def test_albedo_costs_no_cycle():
 
 
 def test_first_pixel_of_a_long_albedo_path():
-    """Without lights nothing hides the latency of texture and product."""
+    """Without lights no other path is as long as that of texture and product."""
     unit = RECORD.variants["albedo, both, without lights, 2 materials"].unit()
     inputs, cycles = cycles_of(unit, [3, 1, 40])
     assert cycles[0] - inputs[0] == unit.latency

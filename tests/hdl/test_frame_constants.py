@@ -1,5 +1,8 @@
 # amaranth: UnusedElaboratable=no
-"""Write port: every address, and what a change of the material costs; `tests/formal` has how writes wait."""
+"""Write port: every address, and the cost of a change of the material.
+
+`tests/formal` proves how writes wait.
+"""
 
 from dataclasses import replace
 
@@ -40,7 +43,7 @@ def run_bench(m, bench):
 
 
 def words_by_address(constants, lights):
-    """Where each address's word is in the output: (fields to it, width, signed)."""
+    """For each address, the position of its word in the output: (fields to the word, width, signed)."""
     words = {}
     for name, (first, count) in FIELDS_OF_A_FRAME.items():
         for k in range(count):
@@ -62,12 +65,15 @@ async def write(ctx, unit, address, data):
 
 @pytest.mark.parametrize("lights", [3, pytest.param(1, marks=pytest.mark.long)])
 def test_every_address_writes_its_constant_and_no_other(lights):
-    """All 512 addresses, in random order, twice: a word is seen two cycles later, every other one stays."""
+    """All 512 addresses are written in random order, twice.
+
+    A word changes two cycles later, and all other words stay.
+    """
     rng = np.random.default_rng(lights)
     unit = FrameConstantsUnit(lights)
     words = words_by_address(unit.constants, lights)
     assert len(words) == 4 + 12 * lights
-    # The words cover the output: nothing is left that no address writes.
+    # The words cover the output: an address writes each bit.
     assert sum(len(word) for word in words.values()) == len(Value.cast(unit.constants))
 
     async def bench(ctx):
@@ -90,14 +96,15 @@ def test_every_address_writes_its_constant_and_no_other(lights):
 @pytest.mark.long
 @pytest.mark.parametrize("lights", [1, pytest.param(3, marks=pytest.mark.long)])
 def test_every_address_writes_its_materials_constant_and_no_other(lights):
-    """All 512 addresses, and now and then another material, or one that there is not, in random order.
+    """All 512 addresses are written in random order, with changes to other materials and to materials that do
+    not exist.
 
-    A write is seen 3 cycles later where the word is of the material, and 2 where it is not; another
-    material's constants are seen 1 cycle after its index is given.
+    A write is visible 3 cycles later if the word belongs to the material, otherwise 2 cycles later. Another
+    material's constants are visible 1 cycle after its index.
     """
     rng = np.random.default_rng(10 + lights)
     materials = 3
-    # Their low bits are those of a material in every case; writes for the last six are lost.
+    # Their low bits are those of a material in every case. Writes for the last six are lost.
     indices = [0, 1, 2] * 4 + [3, 4, 5, 6, 2**9 + 1, 2**17 + 2]
     unit = FrameConstantsUnit(lights, materials)
     words = words_by_address(unit.constants, lights)
@@ -140,7 +147,7 @@ def test_every_address_writes_its_materials_constant_and_no_other(lights):
 
 
 def test_a_bank_past_the_last_is_lost():
-    """Of three banks; nor does it take the place of the material's threshold."""
+    """There are three banks. The bank past the last does not replace the threshold of the material either."""
     unit = FrameConstantsUnit(1, 2, UQ(3, 15), banks=3)
 
     async def bench(ctx):
@@ -160,7 +167,7 @@ def test_numbers_of_materials_out_of_range(materials):
 
 
 def test_reset_clears_the_constants():
-    """Black light and no ambient."""
+    """After a reset all lights are black, and there is no ambient light."""
     unit, reset = FrameConstantsUnit(1), Signal()
 
     async def bench(ctx):
@@ -179,7 +186,7 @@ def test_reset_clears_the_constants():
 
 
 def shade(unit, spans, constants, engine):
-    """Pixels of the materials that there are equal the model's."""
+    """Check that pixels of the existing materials equal the model's."""
     pixels = pixel_beats(unit.model.compute(spans, constants[: unit.model.materials]))
     options = {"count": len(pixels["x"]), "write": writes_of(constants), "engine": engine}
     run = simulate(unit, beats_of(unit, spans), **options)
@@ -188,10 +195,10 @@ def shade(unit, spans, constants, engine):
 
 
 def test_cost_of_a_material_change():
-    """A span of another material is taken 5 cycles after the last pixel of the span before it has left.
+    """A span of another material is taken 5 cycles after the last pixel of the span before has left.
 
-    Its first pixel comes `latency` cycles later, against 1 cycle without the change. An empty span of yet
-    another material takes 5 cycles; one of the same takes 1.
+    Its first pixel comes `latency` cycles later, against 1 cycle without the change. An empty span of a third
+    material takes 5 cycles, an empty span of the same material 1 cycle.
     """
     rng = np.random.default_rng(34)
     design = preset(model="cosquad", method="linear", materials=3)
@@ -201,15 +208,15 @@ def test_cost_of_a_material_change():
     spans = replace(any_spans(rng, design, lengths), material=material)
     run = shade(unit, spans, any_constants(rng, design, spans), "pysim")
     first = np.cumsum(lengths) - lengths
-    # Clocks from the last pixel of the span before: to the next span taken, to its first pixel.
+    # Cycles from the last pixel of the span before: to the next span taken, and to its first pixel.
     waits = {
         2: 5,
         3: 5,
         5: 5,
-        # An empty span of material 2 before it.
+        # An empty span of material 2 comes before it.
         7: 5 + 5,
         8: 5,
-        # Two empty spans of other materials before it.
+        # Two empty spans of other materials come before it.
         11: 5 + 5 + 5,
     }
     for span, cycles in waits.items():
@@ -221,9 +228,9 @@ def test_cost_of_a_material_change():
 
 @pytest.mark.long
 def test_indices_of_no_material_change_nothing():
-    """Writes for a material past the last one are taken and lost: 3 words have indices of 2 bits.
+    """Writes for a material past the last are taken and lost: 3 materials have indices of 2 bits.
 
-    Of the indices 3, 4 and 5 the low bits of two are those of materials.
+    Of the indices 3, 4 and 5, two have the low bits of existing materials.
     """
     rng = np.random.default_rng(35)
     design = preset(model="cosquad", method="linear", materials=3)

@@ -1,5 +1,5 @@
 # amaranth: UnusedElaboratable=no
-"""From the mesh to the bits of the lanes: frames equal to the model's, and what heavy frames do."""
+"""From the mesh to the bits of the lanes: frames equal the model's, and heavy frames lose bands."""
 
 from fractions import Fraction
 
@@ -21,7 +21,7 @@ BACKGROUND = (26, 28, 32)
 
 
 def gpu(blank, bits=RGB888):
-    """A small teapot on a display whose lines have so many blank pixels: time to draw."""
+    """A small teapot on a display whose lines have ``blank`` blank pixels, which is the time to draw."""
     mode = DisplayMode(Axis(64, 4, 8, blank), Axis(48, 2, 2, 8))
     given = scene("teapot", triangles=200, size=mode.size, back_faces="cull")
     design = board_design().built(top="render", geometry_style="compact")
@@ -36,7 +36,7 @@ def shown(made, frames):
 
 
 def test_frames_equal_the_models():
-    """To the bit, and near the exact frame; nothing late."""
+    """Frames equal the model's to the bit, are near the exact frame, and no band is late."""
     made, given = gpu(1000)
     found = shown(made, 3)
     np.testing.assert_array_equal(found.frames, made.frames(3))
@@ -46,12 +46,13 @@ def test_frames_equal_the_models():
     assert (found.frames[0] != found.frames[1]).any()
     state = made.drawing.controls.advance(made.drawing.controls.start)
     figures = compare_image(turned(given, state.angle), made.drawing.renderer.design, found.frames[0])
-    # Corners move by up to a hundredth of a pixel, across which a pixel is surface or background.
+    # Corners move by up to a hundredth of a pixel. Where an edge moves across a pixel's centre, surface or
+    # background changes.
     assert figures.total_error.psnr_db > 30
 
 
 def test_heavy_frames_lose_bands_only():
-    """Every band is that of some angle of the motion, or background; what is background was counted."""
+    """Every band is that of some angle of the motion, or background. Every background band was counted."""
     made, _ = gpu(30, RGB565)
     frames = 6
     found = shown(made, frames)

@@ -1,5 +1,6 @@
 # amaranth: UnusedElaboratable=no
-"""A write that comes while a span is offered: the span has all constants of before, or all of after."""
+"""A write that comes while a span is offered: the span has all constants before the write, or all after
+it."""
 
 from amaranth.sim import Simulator
 
@@ -11,7 +12,10 @@ X, DIFFUSE = (LIGHT_STRIDE + FIELDS_OF_A_LIGHT[name][0] for name in ("direction"
 
 
 def test_a_span_that_is_taken_in_turns_keeps_its_constants():
-    """The quotient method reads a span on three cycles before it accepts it; a write comes on each."""
+    """The quotient method reads a span in three cycles before it accepts the span.
+
+    A write comes in each of them.
+    """
     unit = ShadingPipelineUnit(preset("quotient", "blinn"))
     write, span, pixel = unit.write, unit.i, unit.o
     shades = {}
@@ -27,7 +31,7 @@ def test_a_span_that_is_taken_in_turns_keeps_its_constants():
         await written(DIFFUSE, 255 << 6)
         vectors = {"start": [0.5, 0, 0.5], "step": [-0.5, 0, 0], "exponent": 2}
         ctx.set(span.payload, {"length": 4, **vectors})
-        # Without a write; with one at once; and with one some cycles later.
+        # Without a write, with a write at once, and with a write some cycles later.
         for late in (None, 0, 1, 2, 3):
             await written(X, 0)
             await written(X + 2, 100_000)

@@ -1,5 +1,6 @@
 # amaranth: UnusedElaboratable=no
-"""Pipelines with a table: RTL against the bit-accurate model, tables loaded again, the gate, cost."""
+"""Pipelines with a table: RTL against the bit-accurate model, tables that are loaded again, the gate,
+cost."""
 
 from dataclasses import replace
 
@@ -38,7 +39,7 @@ DESIGNS = {
 
 
 def shade(unit, spans, write, expected, **stalls):
-    """Pixels that are those of the model."""
+    """Check that pixels equal the model's."""
     expected = pixel_beats(expected)
     options = {"count": len(expected["x"]), "write": write, "engine": "auto", **stalls}
     assert_beats_equal(simulate(unit, beats_of(unit, spans), **options).beats, expected)
@@ -58,7 +59,7 @@ def test_equals_model(design):
 
 
 def test_a_frame_loads_its_own_tables():
-    """Tables of the frame before, in every bank, are gone."""
+    """Tables of the frame before are replaced in every bank."""
     design = preset("linear", "ggx", materials=3)
     unit = ShadingPipelineUnit(design)
     spans, constants = _sample(design)
@@ -76,7 +77,7 @@ def test_a_frame_loads_its_own_tables():
 
 
 def test_gate_by_threshold():
-    """As the model decides, for any T; there is no PROM."""
+    """The gate decides as the model, for any T. There is no PROM."""
     p = HighlightGate(QuadraticInterpolator().gate_limits)
     unit = HighlightGateUnit(p, takes_threshold=True)
     assert cost_of(unit).rom_bits == 0
@@ -103,7 +104,7 @@ def test_gate_by_threshold():
 
 
 def test_rate_is_that_of_cosquad():
-    """And the latency, but for a register of the shift, of the table and of the multiplier."""
+    """The latency is equal, too, except for registers of the shift, of the table and of the multiplier."""
     units = [ShadingPipelineUnit(preset("renormalise", model)) for model in ("blinn", "cosquad")]
     assert len({(unit.cycles_per_pixel, unit.setup_interval) for unit in units}) == 1
     assert units[0].latency == units[1].latency + 3

@@ -1,7 +1,7 @@
 # amaranth: UnusedElaboratable=no
-"""Times and parts of units at every interval, as their texts state them; defaults, and what they refuse.
+"""Times and parts of units at every interval, as their docstrings state them; defaults, and refusals.
 
-`tests.test_units` holds the units against their models. Parts of their usual structures are baselines.
+`tests.test_units` compares the units with their models. Parts of their usual structures are baselines.
 """
 
 from collections.abc import Callable
@@ -35,9 +35,10 @@ from blysk.hdl.normals.renormaliser import RenormaliserUnit
 
 
 class Stated(NamedTuple):
-    """What the text of a unit states: its default interval and its largest one, ``None`` if there is none.
+    """Statements of a unit's docstring: its default interval and its largest interval, ``None`` if there is
+    none.
 
-    ``multipliers`` and ``latencies`` are those at the intervals 1, 2, ...; ``rom_bits`` those of its tables.
+    ``multipliers`` and ``latencies`` are for the intervals 1, 2, ...; ``rom_bits`` is for its tables.
     """
 
     make: Callable
@@ -93,7 +94,10 @@ STATED = {
 @pytest.mark.long
 @pytest.mark.parametrize("name", STATED)
 def test_times_and_parts(name):
-    """Times at every interval, parts at the first, the default and the last; none has more than 18 bits."""
+    """Times are checked at every interval, parts at the first, the default and the last.
+
+    No multiplier has more than 18 bits.
+    """
     stated = STATED[name]
     intervals = range(1, len(stated.multipliers) + 1)
     units = [stated.make(initiation_interval=interval) for interval in intervals]
@@ -108,7 +112,7 @@ def test_times_and_parts(name):
 
 @pytest.mark.parametrize("name", STATED)
 def test_intervals(name):
-    """The default, and what is no interval."""
+    """The default, and values that are no interval."""
     make, default, largest, *_ = STATED[name]
     assert make().initiation_interval == default
     message, none = "interval must be at least 1", [0, -1]
@@ -120,8 +124,8 @@ def test_intervals(name):
 
 
 OF_LIGHTS = {
-    # Not always as few as there are products: beats may come at any distance, and a multiplier serves those
-    # that are less than an interval apart.
+    # There may be more multipliers than products divided by the interval. Beats may come at any distance, and
+    # a multiplier serves only products less than an interval apart.
     ChordSetupUnit: {
         **{(1, 1): (6, 18), (1, 2): (3, 21), (1, 3): (2, 21), (1, 4): (2, 20), (1, 6): (2, 20)},
         **{(1, 9): (1, 21), (1, 18): (1, 21), (2, 3): (5, 21), (2, 9): (2, 24), (3, 18): (1, 31)},
@@ -131,7 +135,7 @@ OF_LIGHTS = {
         **{(1, 8): (6, 138, 3), (1, 46): (1, 225, 1), (2, 4): (20, 130, 9)},
     },
 }
-"""Multipliers and latency, and shifters if there are any, of numbers of lights and intervals."""
+"""Multipliers and latency, and shifters if there are any, for numbers of lights and intervals."""
 
 
 @pytest.mark.long
@@ -139,7 +143,7 @@ OF_LIGHTS = {
     ("make", "lights", "interval"), [(make, *key) for make, stated in OF_LIGHTS.items() for key in stated]
 )
 def test_times_and_parts_of_lights(make, lights, interval):
-    """All multipliers are of 18 bits, none of them by a constant."""
+    """All multipliers have 18 bits, and no product is by a constant."""
     unit = make(None, lights, initiation_interval=interval)
     multipliers, latency, *shifters = OF_LIGHTS[make][lights, interval]
     cost = cost_of(unit)
@@ -182,13 +186,13 @@ QUOTIENTS = {
     (2, True): ([6, 3, 2, 2, 2], [16, 22, 22, 23, 21]),
     (1, False): ([2], [10]),
 }
-"""Multipliers and latencies at intervals 1, 2, ... of numbers of lights, with highlights and without."""
+"""Multipliers and latencies at intervals 1, 2, ... for numbers of lights, with and without highlights."""
 
 
 @pytest.mark.long
 @pytest.mark.parametrize(("lights", "highlights"), QUOTIENTS)
 def test_times_and_parts_of_quotients(lights, highlights):
-    """No multiplier has more than 18 bits; the table of the root has 512 words of 30 bits."""
+    """No multiplier has more than 18 bits. The table of the root has 512 words of 30 bits."""
     model = Quotient(QuotientSpans(lights, highlights))
     for interval, stated in enumerate(zip(*QUOTIENTS[lights, highlights], strict=True), 1):
         cost = cost_of(unit := QuotientUnit(model, interval))

@@ -1,5 +1,5 @@
 # amaranth: UnusedElaboratable=no
-"""The shading pipeline: cycles, cost, choices of build and refusals; `test_units` holds its pixels."""
+"""The shading pipeline: cycles, cost, build options and refusals. `test_units` checks its pixels."""
 
 import gc
 import math
@@ -33,7 +33,7 @@ FROM_NORMALS = [name for name, of in METHODS.items() if of.brings_ends]
 
 
 def shade(unit, spans, constants, pixels=None, engine="auto", **stalls):
-    """Run spans; the pixels are those of the model, or others that are given."""
+    """Run spans, and check that their pixels are the model's, or given pixels."""
     case = case_of(unit, spans, constants)
     expected = RECORD.expect(unit, case) if pixels is None else pixel_beats(pixels)
     options = {"write": case.write, "engine": engine, **stalls}
@@ -44,7 +44,7 @@ def shade(unit, spans, constants, pixels=None, engine="auto", **stalls):
 
 
 def spans_in_range(rng, design, lengths, largest=None):
-    """Spans of such lengths that the method serves, and constants."""
+    """Spans with such lengths that the method serves them, and constants."""
     largest = design.interpolator.MAX_ANGLE - 0.01 if largest is None else largest
     left, right = pairs_at(rng, len(lengths), rng.uniform(0, largest, len(lengths)))
     x, y = rng.integers(0, (1 << design.x_bits) - lengths), rng.integers(0, 1 << design.y_bits, len(lengths))
@@ -56,7 +56,7 @@ def spans_in_range(rng, design, lengths, largest=None):
 
 
 def intervals():
-    """Setup intervals of one method of each unit, the shortest and the longest, and the default of each."""
+    """For one method of each unit: the shortest, the longest and the default setup interval."""
     for method in FROM_NORMALS:
         choice = unit_of(METHODS[method]).setup_intervals(METHODS[method])
         choice = [*choice[:2], *choice[2:][-1:]]
@@ -71,7 +71,8 @@ def intervals():
 
 @pytest.mark.parametrize(("method", "interval"), list(intervals()))
 def test_cycles(method, interval):
-    """One pixel a cycle; a span takes its pixels' cycles or the setup interval, whichever is more, no more.
+    """One pixel a cycle: a span takes its number of pixels or the setup interval, whichever is larger, and no
+    more.
 
     The first pixel leaves `latency` cycles after an empty pipeline has accepted its span.
     """
@@ -92,7 +93,7 @@ def test_cycles(method, interval):
     assert np.all(within == unit.cycles_per_pixel)
     assert np.all(taken <= np.maximum(length * unit.cycles_per_pixel, unit.setup_interval))
     if interval is not None:
-        # In a run of single pixels each costs the interval.
+        # In a run of single pixels each pixel takes the interval.
         assert unit.setup_interval == interval
         assert np.all(taken[26:31] == interval)
 
@@ -106,7 +107,7 @@ def test_cycles(method, interval):
     ],
 )
 def test_cycles_of_long_spans(method, latency, interval, lights):
-    """Spans that are set up while the one before is shaded cost their length alone."""
+    """A span that is set up while the span before is shaded takes only its own length."""
     rng = np.random.default_rng(7)
     lengths = np.r_[rng.integers(interval, 40, 300), [4095, 4095, interval]]
     design = preset(method, "cosquad", lights=lights)
@@ -132,7 +133,7 @@ INTERVALS = {
 
 @pytest.fixture
 def never_built():
-    """Pipelines that are refused, or only asked for their figures, are never elaborated."""
+    """These pipelines are refused, or only asked for their figures, and never elaborated."""
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", UnusedElaboratable)
         yield
@@ -145,7 +146,10 @@ def never_built():
     [m if m in ("renormalise", "linear") else pytest.param(m, marks=pytest.mark.long) for m in INTERVALS],
 )
 def test_setup_intervals(method):
-    """Those that there are; the largest to 4 by default, of renormalise 3; others are refused."""
+    """The intervals of a method are 1 to its largest.
+
+    The default is the largest up to 4, for renormalise 3. Others are refused.
+    """
     interpolator, choice = METHODS[method], INTERVALS[method]
     assert tuple(unit_of(interpolator).setup_intervals(interpolator)) == tuple(choice)
     if choice:
@@ -167,7 +171,7 @@ def test_setup_intervals(method):
 @pytest.mark.long
 @pytest.mark.parametrize(("method", "interval"), [("quadratic", 4), ("quadratic", 7)])
 def test_gate_costs_no_cycle(method, interval):
-    """Decisions come in time for spans of every length, however many single pixels are on the way."""
+    """Decisions come in time for spans of every length, however many single pixels are inside."""
     rng = np.random.default_rng(interval)
     design = preset(method, "cosquad", setup_interval=interval)
     lengths = np.r_[rng.integers(1, 40, 200), np.full(150, 1), np.full(60, 5)]
@@ -182,7 +186,7 @@ def test_gate_costs_no_cycle(method, interval):
 
 @pytest.mark.long
 def test_compact_style_takes_three_cycles_a_term():
-    """Highlights cost cycles, and pixels without one do not."""
+    """Highlights take cycles, and pixels without a highlight do not."""
     rng = np.random.default_rng(1)
     design = preset("renormalise", "cosquad", style="compact")
     spans, (constants,) = spans_in_range(rng, design, np.full(30, 60), 20.0)
@@ -198,7 +202,10 @@ def test_compact_style_takes_three_cycles_a_term():
 
 @pytest.mark.long
 def test_gate_spares_the_compact_style_cycles():
-    """A power takes 42 cycles a pixel, but for pixels behind the light and in spans without a highlight."""
+    """A power takes 42 cycles a pixel.
+
+    Pixels behind the light, and spans without a highlight, do not take them.
+    """
     rng = np.random.default_rng(3)
     design = preset("quadratic", "blinn_product", style="compact")
     spans, (constants,) = spans_in_range(rng, design, np.full(30, 40), 20.0)
@@ -210,7 +217,7 @@ def test_gate_spares_the_compact_style_cycles():
         gated = replace(design, gate=gate)
         found = shade(ShadingPipelineUnit(gated), spans, constants, design.compute(spans, constants))
         dark = behind | ~np.repeat(gated.lit_spans(spans, constants)[:, 0], 40) if gate else behind
-        # Few pixels wait beside the power unit, so that dark ones take their three cycles between powers.
+        # Few pixels can wait beside the power unit, so dark pixels take their three cycles between powers.
         expected = np.where(dark, 3, 42).sum()
         assert expected * 0.95 <= found.total_cycles <= expected * 1.05
         cycles.append(found.total_cycles)
@@ -221,9 +228,10 @@ def test_gate_spares_the_compact_style_cycles():
 
 
 def pairs():
-    """Renormalise with a model of each kind of specular unit, another method with two, one published.
+    """Renormalise with a model of each kind of specular unit, another method with two models, and a published
+    method.
 
-    `test_units` has each method with its own model, and the specular unit of every model.
+    `test_units` checks each method with its own model, and the specular unit of every model.
     """
     for index, method in enumerate(FROM_NORMALS):
         kinds = KINDS if method == "renormalise" else (KINDS[index % len(KINDS)], "blinn_product")
@@ -276,7 +284,8 @@ def cost_of_full(style):
     [(part, style) for part in LEFT_OUT for style in STYLES if style == "throughput" or part == "all"],
 )
 def test_less_hardware_shades_the_same(part, style):
-    """A scene that does not need a part has the pixels of the full pipeline without it, and it costs less."""
+    """If a scene does not need a part, the pipeline without this part gives the same pixels and costs
+    less."""
     rng = np.random.default_rng(5)
     full = FULL
     design = replace(full, gate="specular" not in LEFT_OUT[part], **LEFT_OUT[part])

@@ -1,6 +1,7 @@
-"""Several pipelines: pixels of each equal to the model under stalls, cycles, back-pressure, writes, counters.
+"""Several pipelines: the pixels of each equal the model's under stalls; cycles, back-pressure, writes,
+counters.
 
-`tests.test_units` holds the merged stream against the model; here are the other outputs.
+`tests.test_units` compares the merged stream with the model. This file has the separate outputs.
 """
 
 from dataclasses import replace
@@ -22,7 +23,7 @@ from blysk.sim.frames.frame import beats_of
 from ..checks import words_of
 
 PLAIN = preset(model="cosquad", lights=0, x_bits=6, y_bits=4, length_bits=4)
-"""The least pipelines: their pixels have the ambient colour."""
+"""The smallest pipelines: their pixels have the ambient colour."""
 
 
 def shade(unit, spans, constants, **options):
@@ -46,7 +47,7 @@ def assert_lanes(lanes, expected):
 
 @pytest.fixture(scope="module")
 def wide():
-    """Two materials, two pipelines; FIFOs are short enough to be full."""
+    """Two materials and two pipelines. FIFOs are so short that they become full."""
     return WidePipelinesUnit(PixelPipelines(preset("linear", "cosquad", materials=2).built(pipes=2)), 5)
 
 
@@ -54,7 +55,7 @@ def wide():
 @pytest.mark.long
 @pytest.mark.parametrize("shares", STALLS[::3])
 def test_each_lane_equals_its_model_under_stalls(wide, shares):
-    """Every pixel of every pipeline, in order; materials change; and the sums of the counters."""
+    """Every pixel of every pipeline comes in order, while materials change. Counters are sums."""
     rng = np.random.default_rng([7, *(int(10 * share) for share in shares)])
     model = wide.model
     spans = any_spans(rng, model.design, rng.integers(0, 12, 400))
@@ -72,14 +73,18 @@ def test_each_lane_equals_its_model_under_stalls(wide, shares):
 @pytest.mark.long
 @pytest.mark.parametrize("pipes", [1, 2, 4, 8])
 def test_so_many_pixels_a_cycle(pipes):
-    """Spans of as many pixels as there are pipelines, from scanline to scanline: no pipeline ever waits."""
+    """Spans have as many pixels as there are pipelines, from scanline to scanline.
+
+    So no pipeline ever waits.
+    """
     unit = WidePipelinesUnit(PixelPipelines(PLAIN.built(pipes=pipes)), 33)
     rng, count = np.random.default_rng(5), 240
     spans = replace(any_spans(rng, PLAIN, np.full(count, 9)), y=np.arange(count) % 16)
     lanes, run = shade(unit, spans, any_constants(rng, PLAIN, spans))
-    # The first span of each pipeline comes a cycle after that of the one before.
+    # The first span of each pipeline comes a cycle after that of the pipeline before.
     assert run.cycles[-1] - run.cycles[0] == 9 * count // pipes + pipes - 2
-    # Two FIFOs pause for a word that comes for the address that they read: where one comes every other cycle.
+    # Two FIFOs pause for a word that is written to the address that they read. This happens if words come in
+    # every second cycle.
     assert run.cycles[0] == run.input_cycles[0] + unit.latency + (2 if pipes == 2 else 0)
     assert [len(lane) for lane in lanes] == [9 * count // pipes] * pipes
 
@@ -104,11 +109,11 @@ def bench(unit, process):
 
 
 def test_a_port_that_waits_stops_its_pipeline_alone():
-    """Until its FIFO is full; its pixel stays meanwhile, and nothing is lost."""
+    """The pipeline stops until its FIFO is full. Its pixel does not change meanwhile, and nothing is lost."""
     unit, found = PixelPipelinesUnit(PixelPipelines(PLAIN.built(pipes=2)), 4), ([], [])
     rng = np.random.default_rng(9)
     spans = any_spans(rng, PLAIN, np.full(60, 2))
-    # Three in a row for the first, whose port waits; the rest for the other.
+    # Three spans in a row go to the first pipeline, whose port waits. The rest go to the other pipeline.
     spans = replace(spans, y=np.r_[0, 2, 4, np.ones(57, dtype=int)])
     words = words_of(unit.i, beats_of(unit, spans))
 
@@ -140,11 +145,11 @@ def test_a_port_that_waits_stops_its_pipeline_alone():
 
 
 def test_writes_between_frames():
-    """A write that comes while spans wait is accepted after their pixels, and before any new span."""
+    """If a write comes while spans wait, it is accepted after their pixels, and before any new span."""
     unit = MergedPipelinesUnit(PixelPipelines(PLAIN.built(pipes=4)), 5)
     rng = np.random.default_rng(10)
     frames = []
-    # Of a single span nothing but its FIFO tells that it is inside, at first.
+    # At first only its FIFO tells that a single span is inside.
     for count in (25, 1, 1, 25):
         spans = any_spans(rng, PLAIN, rng.integers(1, 6, count))
         frames.append((spans, any_constants(rng, PLAIN, spans)))
@@ -152,7 +157,7 @@ def test_writes_between_frames():
     events, found = [], []
 
     async def send(context, port, words, name):
-        """Each word until it is accepted; pixels are taken meanwhile, on most cycles."""
+        """Send each word until it is accepted. Meanwhile pixels are taken in most cycles."""
         sent = 0
         while sent < len(words):
             context.set(port.valid, 1)
@@ -183,8 +188,8 @@ def test_writes_between_frames():
     np.testing.assert_array_equal(
         found, np.concatenate([np.column_stack([p.x, p.y, p.color]) for p in expected])
     )
-    # Writes of the second frame and on came when all pixels before had left the pipelines; a few may be in
-    # the merger and its register.
+    # Writes of the second frame came when all earlier pixels had left the pipelines. A few pixels may still
+    # be in the merger and its register.
     totals = np.cumsum([0] + [len(p.x) for p in expected])
     index, before = -1, "span"
     for name, taken in events:

@@ -1,4 +1,4 @@
-"""Geometry and renderer say that they are empty only when they are: who draws in bands relies on it."""
+"""Geometry and renderer say that they are empty only if they are. Units that draw in bands rely on this."""
 
 from functools import partial
 
@@ -34,8 +34,8 @@ UNITS = {
 class OneByOne(Wrapped):
     """A unit that gets a triangle only while it says that it is empty.
 
-    ``status.wrong`` counts the cycles on which a beat waits at the output of an empty unit, or on which it is
-    no longer empty without having taken a triangle.
+    ``status.wrong`` counts wrong cycles: a beat waits at the output of an empty unit, or the unit stops being
+    empty without having taken a triangle.
     """
 
     def __init__(self, unit):
@@ -46,7 +46,7 @@ class OneByOne(Wrapped):
         m.submodules.unit = unit = self.unit
         was_empty, took, goes = Signal(), Signal(), Signal()
         takes = unit.i.valid & unit.i.ready
-        # Four cycles in which a triangle that is still inside shows.
+        # In these four cycles a triangle that is still inside would show.
         rests = Signal(4)
         m.d.sync += [was_empty.eq(unit.idle), took.eq(takes), rests.eq((rests << 1) | unit.idle)]
         m.d.comb += [
@@ -63,7 +63,7 @@ class OneByOne(Wrapped):
 
 
 def _units():
-    """CI has the default structures and the smallest, the long run all."""
+    """CI has the default structures and the smallest structure, and the long run has all."""
     for name in UNITS:
         often = name in RECORDS or name == "geometry, compact"
         yield pytest.param(name, marks=[pytest.mark.long, *[pytest.mark.ci] * often])

@@ -1,4 +1,7 @@
-"""Units that make pixels of spans one by one: their cycles; `tests.test_units` has their results."""
+"""Units that make the pixels of spans one after the other: their cycles.
+
+`tests.test_units` checks their results.
+"""
 
 import numpy as np
 import pytest
@@ -24,7 +27,7 @@ def ids(value):
 
 
 def case_of(module, unit, lengths):
-    """Spans of these lengths; some records make them for a unit."""
+    """Spans of these lengths. Some records make spans for a unit."""
     of_unit = () if module in (highlight_cosine, quadratic_evaluator) else (unit,)
     return module.spans_of(*of_unit, np.random.default_rng(1), np.asarray(lengths))
 
@@ -35,7 +38,7 @@ def case_of(module, unit, lengths):
     ("module", "variant"), mostly_long([HIGHLIGHT_COSINE, ACCUMULATOR, *RECURRENCES], *QUICK), ids=ids
 )
 def test_pixels_come_without_gaps(module, variant):
-    """One value in every cycle, or as many cycles later as a pixel takes; an empty span takes a cycle."""
+    """A value comes in every cycle, or after as many cycles as a pixel takes. An empty span takes a cycle."""
     unit = module.RECORD.variants[variant].unit()
     interval = getattr(unit, "cycles_per_pixel", 1)
     lengths = np.r_[1, 2, 3, 16, 1, 1, 4095 if interval == 1 else 400, 0, 5, 0, 0, 1]

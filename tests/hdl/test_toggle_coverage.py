@@ -1,6 +1,6 @@
-"""Toggle coverage: under its record's vectors every register bit of a unit rises and falls, or is waived.
+"""Toggle coverage: with the vectors of its record every register bit of a unit rises and falls, or is waived.
 
-Parts of a unit that have a record of their own are covered by their own vectors.
+Parts of a unit that have a record are covered by the vectors of this record.
 """
 
 import re
@@ -20,9 +20,9 @@ from blysk.sim.engines.toggles import _registers, _words
 
 
 class Edges(Wrapped):
-    """A unit, and of each bit of its registers whether it has risen and fallen.
+    """A unit that counts, for each bit of its registers, whether it has risen and fallen.
 
-    Registers are put together in words of 32 bits, as for `ToggleCounter`.
+    Registers are joined into words of 32 bits, as for `ToggleCounter`.
     """
 
     def __init__(self, unit):
@@ -32,7 +32,7 @@ class Edges(Wrapped):
         super().__init__(unit, status=Out(data.StructLayout({"toggled": edges})))
 
     def registers(self, fragment):
-        """Path and signal of each, in a fixed order."""
+        """Path and signal of each register, in a fixed order."""
         others = tuple(f"{path}." for path in units_inside(fragment))
         return [
             (f"{path}.{getattr(signal, 'name', 'data')}", signal)
@@ -76,14 +76,14 @@ def expanded(text):
 
 
 def spread(text):
-    """Numbers of a range, ``0-8``; else the text itself."""
+    """Numbers of a range such as ``0-8``; otherwise the text itself."""
     found = re.fullmatch(r"(\d+)-(\d+)", text)
     return [str(n) for n in range(int(found[1]), int(found[2]) + 1)] if found else [text]
 
 
 @pytest.fixture
 def long_numbers():
-    """Amaranth writes a mask of all registers as a decimal number."""
+    """Python is allowed long numbers, because Amaranth writes a mask of all registers as a decimal number."""
     digits = sys.get_int_max_str_digits()
     sys.set_int_max_str_digits(0)
     yield
@@ -91,7 +91,7 @@ def long_numbers():
 
 
 def pattern_of(word, bit):
-    """A waived bit as a pattern; brackets stand for themselves."""
+    """A waived bit as a pattern, in which brackets stand for themselves."""
     return f"*{word}[[]{bit}]"
 
 
@@ -99,7 +99,7 @@ def pattern_of(word, bit):
 @pytest.mark.usefixtures("long_numbers")
 @pytest.mark.parametrize("name", RECORDS)
 def test_every_register_bit_rises_and_falls(name):
-    """Every waiver is needed: each matches a bit that does not."""
+    """Every waiver is needed: each matches a bit that does not rise and fall."""
     record = RECORDS[name]
     still = still_bits(record)
     waived = [n for words in record.still.values() for word in words.split() for n in expanded(word)]

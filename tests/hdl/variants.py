@@ -6,7 +6,7 @@ __all__ = ["mostly_long"]
 
 
 def mostly_long(cases, *quick):
-    """Arguments of a parametrised test; all but the quick cases belong to the long run."""
+    """Arguments of a parametrised test. All except the quick cases belong to the long run."""
     return [
         case
         if case in quick

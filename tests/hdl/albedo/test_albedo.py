@@ -1,5 +1,5 @@
 # amaranth: UnusedElaboratable=no
-"""Albedo unit: every variant equal to its model under stalls, its latency, rate and multipliers."""
+"""Albedo unit: every variant equals its model under stalls; its latency, rate and multipliers."""
 
 import numpy as np
 import pytest
@@ -17,7 +17,7 @@ from ...checks import assert_equals_model
 
 @pytest.mark.parametrize("variant", RECORD.variants)
 def test_equals_model(variant):
-    """With stalls on both sides; the long run has more beats of each."""
+    """With stalls on both sides. The long run has more beats of each variant."""
     unit, rng = RECORD.variants[variant].unit(), np.random.default_rng(2)
     stalls = {name: rng.random(97) < 0.4 for name in ("input_stalls", "output_stalls")}
     case = RECORD.stimuli["spans"].make(unit, rng, 150)
@@ -26,7 +26,7 @@ def test_equals_model(variant):
 
 @pytest.mark.parametrize("variant", RECORD.variants)
 def test_latency_and_rate(variant):
-    """A pixel on every cycle of the interval: no unit and no FIFO between them limits it."""
+    """A pixel comes in every cycle of the interval: no unit and no FIFO makes the rate smaller."""
     unit = RECORD.variants[variant].unit()
     case = RECORD.stimuli["spans"].make(unit, np.random.default_rng(3), 100)
     case.beats["length"] = 3
@@ -44,6 +44,6 @@ def test_latency_and_rate(variant):
     ],
 )
 def test_multipliers(model, interval, multipliers):
-    """Of quotients, the filter, and the product of both colours."""
+    """Multipliers of quotients, of the filter, and of the product of both colours."""
     unit = AlbedoUnit(model, initiation_interval=interval)
     assert cost_of(unit).totals["multipliers"] == multipliers

@@ -11,13 +11,13 @@ from blysk.hdl.albedo.texel_memory import TexelMemoryUnit
 
 
 def test_writes_with_gaps():
-    """Every texel of an image is read as it was written, whatever the stream had between the writes."""
+    """Every texel of an image is read as it was written, whatever beats stood between the writes."""
     rng = np.random.default_rng(5)
     memory = TexelMemory(8)
     loaded = memory.load([Texture(rng.random((4, 4, 3)))])
     beats, unit = loaded.writes(), TexelMemoryUnit(memory)
 
-    # A lower half alone, and nothing behind it, changes no word.
+    # A lower half without its upper half changes no word.
     sent = [*zip(beats["value"].tolist(), beats["begins"].tolist(), strict=True), (0, 1), (77, 0)]
 
     async def write(context, value, begins, valid):

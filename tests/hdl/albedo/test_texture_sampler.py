@@ -20,7 +20,7 @@ MEMORY = TexelMemory(104, external=True)
 
 
 class OutsideMemory(wiring.Component):
-    """A sampler, and outside of it a memory whose answers wait up to ``longest - 1`` cycles each."""
+    """A sampler with a memory outside. Each answer of the memory waits up to ``longest - 1`` cycles."""
 
     def __init__(self, longest, waiting=16):
         self.model = TextureSampler(MEMORY)
@@ -57,7 +57,7 @@ class OutsideMemory(wiring.Component):
 
 @pytest.mark.parametrize(("longest", "waiting"), [(9, 16), pytest.param(3, 4, marks=pytest.mark.long)])
 def test_any_latency(longest, waiting):
-    """The same colours in the same order, under all stalls of the record."""
+    """The colours and their order do not depend on the latency, under all stalls of the record."""
     unit = OutsideMemory(longest, waiting)
     runs = [run for run in RECORD.runs(unit, "places") if not run.settles]
     for run in runs[:8]:
@@ -66,7 +66,7 @@ def test_any_latency(longest, waiting):
 
 @pytest.mark.long
 def test_keeps_its_rate_while_answers_are_on_their_way():
-    """A colour a cycle by a memory with a latency: two FIFOs and the banks."""
+    """A memory with a latency gives a colour in every cycle: two FIFOs and the banks."""
     unit = OutsideMemory(1)
     case = next(iter(RECORD.runs(unit, "places"))).case
     found = simulate(unit, case.beats, count=len(case.beats["level"]), **case.sent)

@@ -1,4 +1,4 @@
-"""Layouts of bytes against the C ABI, as ctypes and the C compiler have it; packing against hardware."""
+"""Layouts of bytes against the C ABI of ctypes and of the C compiler; packing against hardware."""
 
 import ctypes
 from dataclasses import replace
@@ -61,7 +61,7 @@ def codes(rng, layout, count):
 
 @pytest.mark.parametrize("name", SHAPES)
 def test_hardware_packs_as_the_model(name):
-    """To bytes and back; a payload of which one number is a bit too wide is a misfit."""
+    """Payloads are packed to bytes and back. If a number is a bit too wide, the payload is a misfit."""
     shape = SHAPES[name]
     layout, rng = layout_of(shape), np.random.default_rng(2026)
     expected = codes(rng, layout, 6)
@@ -95,7 +95,7 @@ def test_hardware_packs_as_the_model(name):
 
 
 def test_an_index_past_the_last_is_a_misfit():
-    """It is read as the last; a bit beside the field does not make it less."""
+    """The index counts as the last. A bit outside the field does not make it smaller."""
     layout = layout_of(data.StructLayout({"a": 3, "index": 10}), below={"index": 3})
     given = np.array([(0, 0), (7, 2), (7, 3), (0, 1023), (0, 1024), (0, 1 << 15 | 3)])
     words = np.zeros(len(given), layout.dtype)

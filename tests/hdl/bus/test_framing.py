@@ -1,4 +1,4 @@
-"""Frames one after the other through a core on a bus: each is drawn as if it were the first."""
+"""Frames one after the other through a core on a bus: each frame is drawn as if it were the first."""
 
 import numpy as np
 import pytest
@@ -21,12 +21,13 @@ DESIGN = preset("linear", "cosquad", x_bits=4, y_bits=4, materials=3).built(
 
 @pytest.fixture(scope="module")
 def unit():
-    """With both memories of depths: that of the pixels, and that of the coarse test."""
+    """The unit has both memories of depths: of the pixels, and of the coarse test."""
     return FramingUnit(DESIGN, size=SIZE)
 
 
 def triangles(count, depth, right=40, material=0):
-    """Triangles over most of the picture, the first at a depth, the others behind; or beside the picture."""
+    """Triangles over most of the picture, the first at a depth and the others behind it; or triangles beside
+    the picture."""
     x, y = np.array([-40, right, -40]) * STEPS, np.array([-40, -40, 40]) * STEPS
     every = np.ones((count, 1), dtype=np.int64)
     return Triangles(
@@ -40,7 +41,7 @@ def triangles(count, depth, right=40, material=0):
 
 
 def constants():
-    """A colour of its own for each material."""
+    """Each material has a colour of its own."""
     rng = np.random.default_rng(1)
     direction, halfway = (unit_codes(rng, 1) for _ in range(2))
     return [
@@ -52,13 +53,16 @@ def constants():
 
 
 def run(unit, frames, keep, expected):
-    """What comes out of the unit for frames of triangles; ``expected`` are triangles by frame, as drawn."""
+    """The output of the unit for frames of triangles.
+
+    ``expected`` has the triangles of each frame as they are drawn.
+    """
     frame, codes = FrameSettings.centred(*SIZE), constants()
     layouts = unit.model
     data, ends = [], []
     for each in frames:
         columns = each.beats
-        # As a driver would, past the range that the layout packs.
+        # The index is sent as a driver might send it, outside the range that the layout packs.
         words = np.zeros(len(each), layouts.given.dtype)
         for name in words.dtype.names:
             words[name] = columns[name]
@@ -82,7 +86,7 @@ def run(unit, frames, keep, expected):
 @pytest.mark.ci
 @pytest.mark.long
 def test_depths_begin_anew_with_each_frame(unit):
-    """Far triangles after near ones, also with a frame between that draws nothing."""
+    """Far triangles come after near triangles, also with an empty frame between them."""
     near, far, beside = triangles(9, 100), triangles(9, 1 << 20), triangles(1, 100, right=-20)
     frames = [near, far, beside, near, beside, far, beside, beside, far]
     status = run(unit, frames, 0, frames)
@@ -97,7 +101,10 @@ def test_a_frame_that_keeps_adds_to_the_picture(unit):
 
 
 def test_a_material_past_the_last_counts_as_the_last(unit):
-    """Of three; it is told by the misfits. The low bits of 4, 5 and 1021 are those of other materials."""
+    """There are three materials.
+
+    The misfits count the index. The low bits of 4, 5 and 1021 are those of other materials.
+    """
     given = [triangles(1, 100, material=index) for index in (0, 1, 2, 3, 4, 5, 1021)]
     drawn = [triangles(1, 100, material=index) for index in (0, 1, 2, 2, 2, 2, 2)]
     assert run(unit, given, 0, drawn)["misfits"] == 4

@@ -1,4 +1,4 @@
-"""Frame constants that the registers hand on: each accepted write on one cycle, no other."""
+"""Frame constants that the registers pass on: each accepted write once, and no other write."""
 
 from amaranth.sim import Simulator
 
@@ -8,7 +8,10 @@ from blysk.hdl.bus.registers import RegistersUnit
 
 
 def test_loads():
-    """Of every constant, in the order of the writes; none of what is refused, or read, or elsewhere."""
+    """The loads have every constant in the order of the writes.
+
+    They have no refused write, no read, and no write to another register.
+    """
     map = RegisterMap("core", (), frame_registers(), constant_registers(preset(model="cosquad", lights=2)))
     unit = RegistersUnit(map)
     accesses, expected = [], []

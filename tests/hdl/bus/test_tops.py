@@ -13,7 +13,7 @@ from blysk.hdl.render import RendererUnit
 
 @pytest.mark.parametrize("lights", [1, 2])
 def test_geometry_alone_is_that_of_the_renderer(lights):
-    """Vectors for several lights are cut in another way, alone or before shading."""
+    """For several lights, geometry alone cuts vectors as the whole renderer does."""
     design = preset(lights=lights)
     model = Renderer(design).geometry
     assert model.rotates == (lights > 1)

@@ -26,7 +26,7 @@ INTERVALS = [3, *(pytest.param(k, marks=pytest.mark.long) for k in (1, 2, 4, 5, 
 
 
 class GraphUnit(PipelinedUnit):
-    """A unit that is a graph: ``describe`` gives its results, by name, each with its shape."""
+    """A unit made from a graph. ``describe`` gives its results by name, each with its shape."""
 
     def __init__(self, interval, describe, spaced=False, memories=False, stands=False):
         self.graph = Dataflow(interval, spaced=spaced, memories=memories)
@@ -54,7 +54,7 @@ class GraphUnit(PipelinedUnit):
 
 
 def verify(unit, beats, expected):
-    """Under every pattern of stalls."""
+    """Compare under every pattern of stalls."""
     rng = np.random.default_rng(2026)
     for shares in STALLS:
         names, periods = ("input_stalls", "output_stalls"), (997, 1009)
@@ -69,11 +69,11 @@ def beats_of(rng, count=100):
     return {"a": a, "b": b, "n": rng.integers(0, 32, count)}
 
 
-# Hardware.
+# Graphs for hardware.
 
 
 def copies(g, a, b, n):
-    """The inputs again, long after they have gone, beside chains of registers."""
+    """The inputs again, long after the beat has moved on, beside chains of registers."""
     late = b
     for k in range(13):
         late = g.register(f"late_{k}", lambda x: x, late)
@@ -86,7 +86,7 @@ def copies(g, a, b, n):
 
 
 def products(g, a, b, n):
-    """``a b``, ``b^2``, their product cut to operands, and ``a b`` again after all of it."""
+    """``a b``, ``b^2``, their product cut to operands, and ``a b`` again after all of these."""
     ab, bb = g.multiply("ab", a, b), g.multiply("bb", b, b)
     fourth = g.multiply("fourth", ab, bb, *([lambda x: x.truncate(15).saturate(SQ(1, 15))] * 2))
     mixed = g.multiply("mixed", fourth, a, lambda x: x.truncate(10).saturate(SQ(1, 10)))
@@ -98,7 +98,7 @@ def products(g, a, b, n):
 
 
 def table(g, a, b, n):
-    """``n^2`` from a table, in a sum and by itself, long after."""
+    """``n^2`` from a table, in a sum and alone, long after the input."""
     square = g.look_up("squares", SQUARES, 10, n)
     total = g.register("total", lambda square, n: (square + n)[:11], square, n)
     late = total
@@ -112,7 +112,7 @@ def table(g, a, b, n):
 
 
 def shifts(g, a, b, n):
-    """Shifts to the right by one operator of three registers, whose results feed it again."""
+    """One operator shifts three registers to the right, and its results are its operands again."""
 
     def make(register, value, amount):
         coarse = register(value >> Cat(Const(0, 2), amount[2:]), "coarse")
@@ -133,7 +133,8 @@ def shifts(g, a, b, n):
 
 
 def late_and_early(g, a, b, n):
-    """A piece read after one register and after both; a wire that is copied in place of its word."""
+    """A piece of a word that is read after one register and after both, and a wire that is copied in place of
+    its word."""
 
     def make(register, x, y):
         first = register(x + y, "first")
@@ -154,7 +155,7 @@ def late_and_early(g, a, b, n):
 
 
 def functions_of(a, b, n):
-    """What the results of each graph should be, of the inputs."""
+    """The right results of each graph, from the inputs."""
     x, y = Fixed(OPERAND, a), Fixed(OPERAND, b)
     fourth = (x * y).truncate(15).saturate(SQ(1, 15)) * (y * y).truncate(15).saturate(SQ(1, 15))
     mixed = fourth.truncate(10).saturate(SQ(1, 10)) * x
@@ -186,7 +187,7 @@ def test_graphs_equal_their_functions(graph, interval):
 
 @pytest.mark.parametrize("graph", [copies, table, late_and_early])
 def test_words_that_wait_in_memories(graph):
-    """They come as from registers: the same results on the same cycles, with fewer registers."""
+    """Words that wait in memories give the same results in the same cycles, with fewer registers."""
     beats = beats_of(np.random.default_rng(1))
     verify(GraphUnit(1, graph, memories=True), beats, functions_of(**beats)[graph])
     registers, memories = (cost_of(GraphUnit(1, graph, memories=m)) for m in (False, True))
@@ -196,7 +197,7 @@ def test_words_that_wait_in_memories(graph):
 
 @pytest.mark.parametrize("interval", [2, 3])
 def test_results_that_stand_need_no_spare_register(interval):
-    """The same results on the same cycles, under stalls, and fewer registers."""
+    """Results that stand come in the same cycles under stalls, with fewer registers."""
     beats = beats_of(np.random.default_rng(interval))
     verify(GraphUnit(interval, copies, stands=True), beats, functions_of(**beats)[copies])
     bits = [cost_of(GraphUnit(interval, copies, stands=stands)).register_bits for stands in (False, True)]
@@ -204,7 +205,7 @@ def test_results_that_stand_need_no_spare_register(interval):
 
 
 def test_refuses_a_result_that_does_not_stand():
-    """That of a shared unit is there for one cycle."""
+    """The result of a shared unit is there for one cycle only."""
     unit = GraphUnit(3, shifts, stands=True)
     with pytest.raises(ValueError, match=r"^\w+ does not stay for 2 cycles from stage \d+ on$"):
         cost_of(unit)
@@ -214,12 +215,12 @@ WORD = 18
 
 
 def wrapped(code):
-    """Codes of 18 bits signed."""
+    """The code in 18 bits, signed."""
     return (code + (1 << WORD - 1)) % (1 << WORD) - (1 << WORD - 1)
 
 
 class RandomGraph:
-    """Shared sums and products of random words, registers and copies; and the same in NumPy."""
+    """Shared sums and products of random words, registers and copies, in hardware and in NumPy."""
 
     def __init__(self, seed):
         rng = np.random.default_rng(seed)
@@ -229,7 +230,7 @@ class RandomGraph:
         ]
 
     def describe(self, g, a, b, n):
-        """Words of the graph; its last five are results."""
+        """Words of the graph. The last five words are results."""
 
         def add(register, x, y):
             return register((register(x, "x") + register(y, "y"))[:WORD].as_signed(), "total")
@@ -253,7 +254,7 @@ class RandomGraph:
         return results, dict.fromkeys(results, signed(WORD))
 
     def compute(self, beats):
-        """What the results should be."""
+        """The right results."""
         words = [beats["a"], beats["b"], beats["n"]]
         for kind, first, second in self.steps:
             x, y = words[first], words[second]
@@ -264,7 +265,7 @@ class RandomGraph:
 @pytest.mark.parametrize("interval", INTERVALS)
 @pytest.mark.parametrize("seed", [1, *(pytest.param(k, marks=pytest.mark.long) for k in range(2, 7))])
 def test_spaced_graphs_at_any_distance(interval, seed):
-    """A random graph equals its function, at the interval, and at every distance from there on."""
+    """A random graph equals its function if beats come at the interval, and at every longer distance."""
     graph, rng = RandomGraph([interval, seed]), np.random.default_rng(seed)
     unit = GraphUnit(interval, graph.describe, spaced=True)
     beats = beats_of(rng)
@@ -276,7 +277,7 @@ def test_spaced_graphs_at_any_distance(interval, seed):
     run = simulate(unit, beats, count=100, engine="pysim", input_stalls=stalls)
     for name, words in expected.items():
         np.testing.assert_array_equal(run.beats[name], words)
-    # None has to wait for more than the interval.
+    # No beat has to wait longer than the interval.
     np.testing.assert_array_equal(np.diff(run.input_cycles), distances)
     np.testing.assert_array_equal(run.cycles, run.input_cycles + unit.latency)
 
@@ -327,7 +328,7 @@ def test_multiplier_bits():
 @pytest.mark.parametrize("shared", [False, True])
 @pytest.mark.parametrize("interval", [3, *(pytest.param(k, marks=pytest.mark.long) for k in (1, 2, 5, 9))])
 def test_dot_products(interval, shared):
-    """Of two words, of a word and itself, and of a word and what is made from it."""
+    """Dot products of two words, of a word with itself, and of a word with a function of this word."""
 
     def describe(g, a, b, n):
         half = FixedValue.constant(OPERAND, 0.5)

@@ -1,4 +1,4 @@
-"""Every hardware operation equal to its NumPy model, exhaustively at small widths, and the refusals."""
+"""Every hardware operation equals its NumPy model, by exhaustion of short words; refusals."""
 
 import operator
 from itertools import product

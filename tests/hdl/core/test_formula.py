@@ -1,4 +1,4 @@
-"""Formulas: what traced functions come out as, and where there is none."""
+"""Formulas of traced functions, and functions without a formula."""
 
 import pytest
 from amaranth.hdl import Cat, Value
@@ -54,7 +54,7 @@ def test_words_of_a_graph():
     assert dot(g, "square", a, a).formula.text == "|N_a|²"
     u = g.register("u", lambda x: ONE - x, cosine)
     assert u.formula.text == "1 − N_a·N_b"
-    # A symbol stands for itself, and so does the name of a word that is long or has no formula.
+    # A symbol stands for itself. So does the name of a word that is long or has no formula.
     steps = g.register("steps", lambda m: m.all(), m)
     long = g.register("long", lambda u, x: u + x - u + x, u, cosine)
     assert g.multiply("product", u, steps).formula.text == "u·steps"

@@ -1,5 +1,5 @@
 # amaranth: UnusedElaboratable=no
-"""Refusals of FIFOs made from memories; what they do is proved where they are used."""
+"""Refusals of FIFOs made from memories. Proofs of the units that use these FIFOs cover their behaviour."""
 
 import re
 

@@ -1,4 +1,4 @@
-"""The scheduler: stages and slots by hand; random graphs, no two uses of an instance ever meet."""
+"""The scheduler: stages and slots by hand; in random graphs two uses of an instance never meet."""
 
 import numpy as np
 import pytest
@@ -30,7 +30,10 @@ def test_earliest_stages_by_hand():
 
 
 def test_slots_by_hand():
-    """Three uses of one instance: the second and the third wait for a slot. Two instances have four slots."""
+    """With three uses of one instance the second and the third wait for a slot.
+
+    Two instances have four slots.
+    """
     a = operation("a", latency=0, lifetime=3, since=1)
     uses = [operation(f"use_{k}", a, latency=3, resource="multiplier") for k in range(3)]
     assert stages([a, *uses], 3) == [1, 4, 5, 6]
@@ -40,7 +43,7 @@ def test_slots_by_hand():
 
 
 def test_uses_wait_for_each_other_where_beats_come_at_any_distance():
-    """The first of four uses waits until the second comes, so that two instances serve all."""
+    """The first of four uses waits for the second, so that two instances serve all four."""
     a = operation("a", latency=0, since=1)
     first = operation("first", a, latency=3, resource="shifter")
     chain = [operation("wait", a)]
@@ -55,7 +58,7 @@ def test_uses_wait_for_each_other_where_beats_come_at_any_distance():
 
 
 def test_operations_with_hardware_of_their_own_come_late():
-    """Only where their operands are there later all the same, so that no copy is made for it."""
+    """An operation comes later only if its operands are there later anyway, so that it needs no copy."""
     a = operation("a", latency=0, lifetime=1, since=0)
     b = operation("b", latency=0, lifetime=1, since=0)
     early, kept = operation("early", a), operation("kept", b)
@@ -84,7 +87,7 @@ def random_operations(rng, interval):
 
 
 def check(words, schedule, interval, spaced):
-    """What the scheduler guarantees, each beat and cycle written out."""
+    """Check the guarantees of the scheduler, for each beat and cycle."""
     for word in words:
         placement = schedule.placements[word]
         for operand in word.operands:

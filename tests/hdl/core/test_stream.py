@@ -1,5 +1,5 @@
 # amaranth: UnusedElaboratable=no
-"""Connections that look at every field, and the control of a pipelined unit: stalls and distance."""
+"""Connections that compare every field, and the control of a pipelined unit: stalls and distance."""
 
 import itertools
 from functools import partial
@@ -61,7 +61,7 @@ def test_connect_carries_payload_valid_and_ready(shape):
 
 
 class Registers(wiring.Component):
-    """So many registers in a row; each adds nothing but its clock."""
+    """Some registers in a row. Each register adds only a cycle."""
 
     i: In(stream.Signature(unsigned(16)))
     o: Out(stream.Signature(unsigned(16)))
@@ -82,7 +82,7 @@ class Registers(wiring.Component):
 
 
 class Delay(PipelinedUnit):
-    """The input, plus 1 for every register but the first; one register a clock of latency."""
+    """The input, plus 1 for every register but the first. There is one register for each cycle of latency."""
 
     def __init__(self, latency, initiation_interval=1, spaced=False):
         super().__init__(
@@ -101,12 +101,15 @@ class Delay(PipelinedUnit):
 
     @property
     def added(self):
-        """What the registers add to the input."""
+        """The number that the registers add to the input."""
         return self.latency - (self.initiation_interval > 1)
 
 
 class Ages(PipelinedUnit):
-    """How many enabled cycles ago each age of the beat that leaves was, 4 bits an age; one beat at a time."""
+    """For each age of the beat that leaves: the number of enabled cycles ago, 4 bits an age.
+
+    There is one beat at a time.
+    """
 
     def __init__(self):
         super().__init__(unsigned(1), unsigned(12), latency=4, initiation_interval=4)
@@ -160,7 +163,10 @@ UNITS = [
 @pytest.mark.parametrize("make", UNITS)
 @pytest.mark.parametrize(("input_share", "output_share"), [(0, 0), (0.4, 0.4), (0.9, 0.1), (0.1, 0.9)])
 def test_stalls_and_distance(make, input_share, output_share):
-    """Nothing lost, repeated, or changed while it waits; without stalls every clock is as said."""
+    """No beat is lost or repeated, and none changes while it waits.
+
+    Without stalls every cycle is as stated.
+    """
     unit = make()
     rng = np.random.default_rng(unit.latency)
     latency, interval = unit.latency, unit.initiation_interval
@@ -180,7 +186,7 @@ def test_stalls_and_distance(make, input_share, output_share):
 
 @pytest.mark.parametrize("make", UNITS)
 def test_a_stall_costs_its_own_clock(make):
-    """After beats have waited, those behind them follow on every clock that the interval allows."""
+    """After beats have waited, the beats behind them follow in every cycle that the interval allows."""
     unit = make()
     codes = np.arange(60)
     stalled = simulate(unit, codes, count=60, engine="pysim", output_stalls=np.arange(1000) % 40 == 20)
@@ -192,7 +198,7 @@ def test_a_stall_costs_its_own_clock(make):
 
 @pytest.mark.parametrize("make", UNITS)
 def test_ready_waits_for_no_other_ready(make):
-    """Input ready, output valid and payload are what registers say: no path leads to them from a port."""
+    """Input ready, output valid and payload come from registers alone. No path leads to them from a port."""
     unit = make()
     rng = np.random.default_rng(unit.latency)
     seen = set()
@@ -222,7 +228,7 @@ def test_ready_waits_for_no_other_ready(make):
 @pytest.mark.parametrize("interval", [2, 3, 5])
 @pytest.mark.parametrize("output_share", [0, 0.4])
 def test_spaced_beats_come_at_any_distance(interval, output_share):
-    """From the interval on, not counting the cycles of standing still; never sooner."""
+    """Beats come at the interval or later, not counting stalled cycles, and never sooner."""
     unit = Delay(9, interval, True)
     rng = np.random.default_rng(interval)
     codes = rng.integers(0, 2**15, 300)
@@ -232,7 +238,7 @@ def test_spaced_beats_come_at_any_distance(interval, output_share):
     distance = np.diff(run.input_cycles)
     assert distance.min() == interval
     if not output_share:
-        # Any distance occurs, and no beat waits for one that the source does not make.
+        # Every distance occurs. No beat waits for a distance that the source does not make.
         assert {interval, interval + 1, interval + 2} <= set(distance.tolist())
         np.testing.assert_array_equal(run.cycles, run.input_cycles + 9)
     else:
@@ -241,18 +247,21 @@ def test_spaced_beats_come_at_any_distance(interval, output_share):
 
 @pytest.mark.parametrize("count", [1, 3])
 def test_slices_lose_no_cycle_to_a_payload_that_waits(count):
-    """A sink that takes one of two, a source that pauses: each register holds one more while one waits."""
+    """The sink takes one of two beats, and the source pauses.
+
+    Each register holds a further beat while one waits.
+    """
     unit = Registers(count)
     codes = np.arange(60)
     stalls = {"input_stalls": np.arange(4) % 4 == 1, "output_stalls": np.arange(4) % 4 == 3}
     run = simulate(unit, codes, count=60, engine="pysim", **stalls)
     np.testing.assert_array_equal(run.beats, codes)
-    # Three of four cycles, on both sides, whatever their phases.
+    # Both sides move in three of four cycles, with all phases.
     assert run.cycles[-1] - run.cycles[10] <= 49 * 4 // 3 + 1
 
 
 def test_at_counts_enabled_cycles():
-    """Age 1 is 3 cycles before a beat leaves at age 4, and so on; cycles of standing still do not count."""
+    """Age 1 is 3 cycles before a beat leaves at age 4, and so on. Stalled cycles do not count."""
     rng = np.random.default_rng(1)
     stalls = {"input_stalls": rng.random(97) < 0.3, "output_stalls": rng.random(89) < 0.5}
     run = simulate(Ages(), np.zeros(100, int), count=100, engine="pysim", **stalls)

@@ -1,4 +1,4 @@
-"""Views are copied and chosen between only where fields, widths, signs and fixed-point formats agree."""
+"""Views are copied, or chosen between, only if fields, widths, signs and fixed-point formats are equal."""
 
 import ast
 
@@ -40,7 +40,7 @@ EQUAL = [
     lambda: data.UnionLayout({"a": unsigned(3), "b": signed(4)}),
 ]
 
-# Two shapes, of equal width wherever that can be, and the end of the message.
+# Two shapes, of equal width if possible, and the end of the message.
 DIFFERENT = [
     (SQ(1, 17), SQ(2, 16), "payload is SQ(1, 17) on one side, SQ(2, 16) on the other"),
     (SQ(1, 17), UQ(1, 17), "payload is SQ(1, 17) on one side, UQ(1, 17) on the other"),
@@ -100,7 +100,7 @@ def test_different_shapes_are_refused(a, b, message):
     ],
 )
 def test_kinds_are_told_apart(a, b):
-    """A structure is no plain number, nor an array, though the bits are as many."""
+    """A structure is not a number and not an array, even with the same number of bits."""
     for one, other in ((a, b), (b, a)):
         with pytest.raises(TypeError, match=r"on one side, .* on the other$"):
             require_same_shape(one, other)
@@ -139,7 +139,7 @@ def test_bits_that_are_views_carry_every_field():
 
 
 def test_copies_of_views_are_checked_everywhere():
-    """No file of hdl takes the shapes off both sides of an assignment, where `copy` would compare them."""
+    """No file of hdl removes the shapes on both sides of an assignment, because `copy` compares them."""
 
     def cast(node):
         return isinstance(node, ast.Call) and ast.unparse(node.func) == "Value.cast"

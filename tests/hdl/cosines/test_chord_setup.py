@@ -1,5 +1,5 @@
 # amaranth: UnusedElaboratable=no
-"""Chord setup: options, beats at any distance, waiting output; `tests.test_units` has its results."""
+"""Chord setup: options, beats at any distance, waiting output. `tests.test_units` checks its results."""
 
 import numpy as np
 import pytest
@@ -20,7 +20,8 @@ def test_options():
 
 @pytest.mark.parametrize("interval", [3, pytest.param(9, marks=pytest.mark.long)])
 def test_beats_at_any_distance(interval):
-    """Each distance from the interval to three of it: taken at once, and the model's words."""
+    """At each distance from one interval to three intervals, beats are taken at once, and words are the
+    model's."""
     unit = ChordSetupUnit(ChordSetup(), 1, initiation_interval=interval)
     case = RECORD.stimuli["spans"].make(unit, np.random.default_rng(3), 200)
     distances = np.tile(np.arange(interval, 3 * interval + 1), 40)[:199]
@@ -33,7 +34,10 @@ def test_beats_at_any_distance(interval):
 
 
 def test_waiting_output_blocks_the_input():
-    """Of each pair of beats the first waits at the output: the second enters one cycle after it has left."""
+    """The first beat of each pair waits at the output.
+
+    The second enters one cycle after the first has left.
+    """
     unit = ChordSetupUnit()
     case = RECORD.stimuli["spans"].make(unit, np.random.default_rng(3), 40)
     stalls = {"input_stalls": np.arange(60) != 0, "output_stalls": np.arange(120) < 65}

@@ -1,5 +1,5 @@
 # amaranth: UnusedElaboratable=no
-# Above: a component that is refused is never elaborated.
+# A component that is refused is never elaborated; the line above switches off the warning.
 """Components for the tests of the Verilog writer."""
 
 from amaranth.hdl import Array, Cat, Module, Signal, signed
@@ -113,7 +113,8 @@ class Stages(wiring.Component):
 
 
 class Awkward(wiring.Component):
-    """Names that are keywords, collide when made plain, or hold brackets; an enumeration and a union."""
+    """Names that are keywords, names that are equal when made plain, names with brackets; an enumeration and
+    a union."""
 
     i: In(
         stream.Signature(

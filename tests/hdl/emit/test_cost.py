@@ -1,4 +1,4 @@
-"""Costs: counted right on a component made for it; those of units are baselines."""
+"""Costs are counted right for a component made for this test. Costs of units are baselines."""
 
 from amaranth.hdl import Cat, Module, Signal, signed, unsigned
 from amaranth.lib import memory, stream
@@ -8,7 +8,8 @@ from blysk.hdl.emit.cost import Cost, cost_of
 
 
 class Sample(Component):
-    """Two multipliers, one of a sign-extended operand; one by a constant; 16 registers; two memories."""
+    """Two multipliers, one with a sign-extended operand; a product by a constant; 16 registers; two
+    memories."""
 
     i: In(stream.Signature(signed(16)))
     o: Out(stream.Signature(unsigned(16)))

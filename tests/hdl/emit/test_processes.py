@@ -1,4 +1,4 @@
-"""Programs end with the process that starts them, killed or not, with what they start in turn."""
+"""Programs end with the process that starts them, killed or not, and so do the programs that they start."""
 
 import os
 import signal
@@ -14,7 +14,7 @@ from blysk.hdl.emit.processes import Process, run_program
 
 pytestmark = pytest.mark.skipif(not Path("/proc/self/stat").exists(), reason="needs /proc")
 
-# A shell that starts a program in turn, as a compiler does.
+# A shell that starts another program, as a compiler does.
 PARENT = """
 import sys, threading, time
 from blysk.hdl.emit import processes
@@ -32,7 +32,7 @@ WAYS = {"killed": "time.sleep(300)", "over": "sys.stdin.read()"}
 
 
 def numbers(folder):
-    """Processes that the shells have told of."""
+    """Numbers of the processes that the shells have written down."""
     path = folder / "numbers"
     return [int(line) for line in path.read_text().split()] if path.exists() else []
 
@@ -74,7 +74,7 @@ def test_kill_reaches_what_the_program_started(tmp_path):
 
 
 def test_a_guard_that_was_killed_is_replaced(tmp_path):
-    """What ran before is guarded again."""
+    """After the guard was killed, running programs are guarded again."""
     code = (
         "import os, signal, sys\n"
         "from blysk.hdl.emit.processes import Process, _guard\n"
@@ -90,7 +90,7 @@ def test_a_guard_that_was_killed_is_replaced(tmp_path):
 
 
 def test_the_guard_begins_before_the_first_program(monkeypatch):
-    """A parent that is killed as soon as its first program runs leaves it to a guard that is there."""
+    """If a parent is killed as soon as its first program runs, the guard already exists."""
     begun, begin = [], processes._Popen.__init__
 
     def begins(self, command, *rest, **options):
@@ -105,7 +105,10 @@ def test_the_guard_begins_before_the_first_program(monkeypatch):
 
 
 def test_run_program_is_run():
-    """As subprocess.run: output, errors, status, input and limit of time; without an input there is none."""
+    """The function behaves as subprocess.run: output, errors, status, input and limit of time.
+
+    Without input the program gets none.
+    """
     code = "import sys; print(sys.stdin.read()); print('e', file=sys.stderr); sys.exit(3)"
     command = [sys.executable, "-c", code]
     done = run_program(command, input="given", capture_output=True, text=True)

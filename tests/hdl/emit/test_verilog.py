@@ -1,5 +1,5 @@
 # amaranth: UnusedElaboratable=no
-# Above: a component that is refused is never elaborated.
+# A component that is refused is never elaborated; the line above switches off the warning.
 import os
 import re
 import shutil
@@ -24,7 +24,7 @@ APART = (
     *("span_halver", "vector_adapter", "light_adapter", "bisection_chain", "arccos", "chord", "half_chord"),
     "serial_vectors",
 )
-"""Two small units, and parts of other structures than those of the cores."""
+"""Two small units, and parts with other structures than those of the cores."""
 
 WITH_ALBEDO = "albedo, both, tints, chord-local, 2 lights, srgb"
 """A long variant of the pipeline, which has the units of an albedo."""
@@ -41,11 +41,11 @@ CORES = {
     if (name == "pipeline" and (not given.long or variant == WITH_ALBEDO))
     or (variant == record.default and name in (*WHOLE, *APART))
 }
-"""By names of modules: some of their own, the pipelines, and what is in none of them."""
+"""Names of modules by groups: some of their own, the pipelines, and modules of neither group."""
 
 OFTEN = re.compile("everything|stages|awkward|combinational|dot_product|difference_accumulator")
 NEWER = "1800-2017"
-"""SystemVerilog, which reads the same text; a few cores tell."""
+"""Tools that read the same text as SystemVerilog. A few cores are enough."""
 NAMES = [name if OFTEN.match(name) else pytest.param(name, marks=pytest.mark.long) for name in CORES]
 
 
@@ -64,7 +64,7 @@ def test_every_unit_is_in_a_core():
 
 
 class Texts(dict):
-    """Text of each core, made when it is asked for."""
+    """Text of each core, made when it is first needed."""
 
     def __missing__(self, name):
         return self.setdefault(name, emit(CORES[name](), name))
@@ -139,7 +139,7 @@ def test_verilator_exceptions_are_the_ones_needed(texts, tmp_path):
 
 
 def test_verilator_switches_end_with_the_text(texts, tmp_path):
-    """A warning in a file that follows is still given."""
+    """A warning in a following file still appears."""
     path = tmp_path / "two.v"
     path.write_text(texts["stages"] + "module two(input [3:0] a, output [7:0] b); assign b = a; endmodule\n")
     done = verilator("--lint-only", "--top-module", "two", path)
@@ -157,7 +157,7 @@ def test_icarus_has_no_warning(texts, name, tmp_path):
 
 @pytest.mark.long
 def test_yosys_has_no_warning(texts, tmp_path):
-    """All cores in one design: their module names do not meet."""
+    """All cores are in one design, so their module names must differ."""
     if find_spec("pyosys") is None:
         pytest.skip("the Python package pyosys is not installed")
     for name in CORES:
@@ -182,7 +182,7 @@ def test_text_is_plain(texts, name):
     assert text.isascii()
     assert text.endswith("\n")
     assert "\\" not in text
-    # A memory's read register that starts at 0 in Amaranth says so in an attribute, for the bits that do.
+    # If a memory's read register starts at 0 in Amaranth, an attribute says so, for these bits.
     attributes = re.findall(r"\(\*(?!\))(.*?)\*\)", text)
     assert all(
         re.fullmatch(r" parallel_case | init = \d+'(h0+|b[0x]+) ", attribute) for attribute in attributes

@@ -12,7 +12,10 @@ from blysk.hdl.geometry.triangles import COUNTER_BITS, count_events, counters_sh
 
 @pytest.mark.parametrize("bits", range(COUNTER_BITS + 1))
 def test_a_counter_counts_on(monkeypatch, bits):
-    """As after 2^bits - 1 events: with an event, without, and with one again; modulo 2^32."""
+    """The counter starts as after 2^bits - 1 events.
+
+    It gets a cycle with an event, one without, and one with; it counts modulo 2^32.
+    """
     start = (1 << bits) - 1
     monkeypatch.setattr(triangles, "Signal", partial(Signal, init=start))
     m, event, counters = Module(), Signal(), Signal(counters_shape("events"))

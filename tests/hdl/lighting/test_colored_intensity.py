@@ -1,5 +1,5 @@
 # amaranth: UnusedElaboratable=no
-"""Intensity units with an albedo: every variant equal to its model under stalls; cycles, resets, netlists."""
+"""Intensity units with an albedo: every variant equals its model under stalls; cycles, resets, netlists."""
 
 import numpy as np
 import pytest
@@ -19,7 +19,7 @@ VARIANTS = [name for name in RECORD.variants if name.startswith("albedo")]
 
 @pytest.mark.parametrize("variant", VARIANTS)
 def test_equals_model(variant):
-    """With and without stalls; the long run has more beats of each."""
+    """With and without stalls. The long run has more beats of each variant."""
     unit, rng = RECORD.variants[variant].unit(), np.random.default_rng(2)
     stalls = {name: rng.random(97) < 0.4 for name in ("input_stalls", "output_stalls")}
     for stimulus, held in (("terms", {}), ("colors", stalls)):
@@ -29,7 +29,7 @@ def test_equals_model(variant):
 
 @pytest.mark.parametrize("variant", [name for name in VARIANTS if "compact" in name and "16" not in name])
 def test_cycles_of_the_compact_style(variant):
-    """Those of the model, from each pixel to the next."""
+    """The cycles from each pixel to the next are those of the model."""
     unit = RECORD.variants[variant].unit()
     case = RECORD.stimuli["terms"].make(unit, np.random.default_rng(4), 60)
     terms = (case.beats["diffuse"], case.beats.get("specular", np.zeros((60, 0), dtype=np.int64)))
@@ -50,7 +50,7 @@ def test_compact_reset_at_every_cycle_of_a_pixel():
 
 @pytest.mark.parametrize(("compact", "plain", "further"), [(False, 6, 3), (True, 1, 0)])
 def test_multipliers(compact, plain, further):
-    """Three more in the throughput style, with tints too; none more in the compact style."""
+    """The throughput style takes three further multipliers, with tints, too. The compact style takes none."""
     for count, model in (
         (plain, Intensity()),
         (plain + further, Intensity(has_albedo=True, tints=True)),

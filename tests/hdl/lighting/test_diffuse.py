@@ -1,5 +1,5 @@
 # amaranth: UnusedElaboratable=no
-"""Diffuse unit: refusals; `tests.test_units` holds it against its model."""
+"""Diffuse unit: refusals. `tests.test_units` compares it with its model."""
 
 import pytest
 

@@ -1,5 +1,5 @@
 # amaranth: UnusedElaboratable=no
-"""Factor unit: what a factor costs; `tests.test_units` holds it against its model."""
+"""Factor unit: the cost of a factor. `tests.test_units` compares it with its model."""
 
 import pytest
 
@@ -17,7 +17,7 @@ def test_a_product_or_none():
 
 @pytest.mark.long
 def test_a_light_that_fades_takes_a_product_a_pixel_and_two_a_span():
-    """At an interval of 3 the setup's 13 products of two lights are 15 or 17, on 5 or 6 multipliers."""
+    """At an interval of 3 the setup's 13 products of two lights become 15 or 17, on 5 or 6 multipliers."""
     counts = []
     for factors in ((), (1,), (0, 1)):
         unit = ShadingPipelineUnit(preset("chord-local", "blinn", 2, factors=factors))
@@ -29,7 +29,7 @@ def test_a_light_that_fades_takes_a_product_a_pixel_and_two_a_span():
 
 
 def test_compact_lights_without_a_factor_do_not_wait():
-    """The terms of such a light take no unit more; its input has no factor."""
+    """The terms of a light without a factor need no further unit, and its input has no factor."""
     unit = ShadingPipelineUnit(preset("chord-local", "lyon3", 2, factors=(1,), style="compact"))
     members = [set(light.i.payload.shape().members) for light in unit._shading.lights]
     assert ["factor" in names for names in members] == [False, True]

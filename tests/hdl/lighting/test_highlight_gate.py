@@ -1,5 +1,5 @@
 # amaranth: UnusedElaboratable=no
-"""Highlight gate: what its record covers, and refusals; `tests.test_units` has its results."""
+"""Highlight gate: the decisions in its record, and refusals. `tests.test_units` checks its results."""
 
 import numpy as np
 import pytest
@@ -12,7 +12,7 @@ GATE = RECORD.variants[RECORD.default].unit().model
 
 @pytest.mark.parametrize("variant", RECORD.variants)
 def test_spans_of_the_record_are_decided_both_ways(variant):
-    """Each light lights some spans, not all: a unit that always gives one decision cannot pass."""
+    """Each light lights some spans, but not all. So a unit that always gives the same decision fails."""
     unit = RECORD.variants[variant].unit()
     for run in RECORD.runs(unit, "spans"):
         share = (run.expected[:, np.newaxis] >> np.arange(unit.lights) & 1).mean(axis=0)

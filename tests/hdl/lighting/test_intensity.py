@@ -1,5 +1,5 @@
 # amaranth: UnusedElaboratable=no
-"""Compact intensity unit: its cycles and resets; `tests.test_units` holds both against their model."""
+"""Compact intensity unit: its cycles and resets. `tests.test_units` compares both styles with their model."""
 
 import numpy as np
 import pytest
@@ -18,7 +18,7 @@ def runs_of(lights, stimulus):
 
 @pytest.mark.parametrize("lights", [1, 3, *(pytest.param(k, marks=pytest.mark.long) for k in (2, 16))])
 def test_compact_takes_three_cycles_a_term(lights):
-    """Three for each term that is not 0, and three where there is none."""
+    """Three cycles for each term that is not 0, and three for a pixel without terms."""
     unit, run = runs_of(lights, "terms")
     cycles = 3 * np.maximum(sum((terms != 0).sum(axis=1) for terms in run.case.beats.values()), 1)
     assert cycles.min() == 3
@@ -38,7 +38,7 @@ def test_compact_reset_at_every_cycle_of_a_pixel():
 
 @pytest.mark.parametrize("unit", RECORD.stimuli["halves"].variants)
 def test_halves_of_the_record_are_halves(unit):
-    """So many of each kind that a wrong rounding shows, here and in every channel."""
+    """There are enough halves of each kind to show a wrong rounding, in every channel."""
     beats = next(RECORD.runs(RECORD.variants[unit].unit(), "halves")).case.beats
     rest = ((5 << 17) + 8191 * beats["diffuse"] + 6003 * beats["specular"]) % (1 << 23)
     assert np.all(np.bincount((1 << 22) - rest[:, 0]) > 300)

@@ -1,5 +1,5 @@
 # amaranth: UnusedElaboratable=no
-"""Light unit: cycles of lit and dark beats; `tests.test_units` has its terms."""
+"""Light unit: cycles of lit and dark beats. `tests.test_units` checks its terms."""
 
 import numpy as np
 import pytest
@@ -17,7 +17,10 @@ from blysk.sim.engines.simulate import simulate
     ],
 )
 def test_dark_beats_bypass_the_specular_unit(name):
-    """Dark beats take two cycles each, or an interval of one; after them a lit beat waits for its slot."""
+    """A dark beat takes two cycles, or one if the interval is one.
+
+    A lit beat after dark beats waits for its slot.
+    """
     unit = RECORD.variants[name].unit()
     run = next(RECORD.runs(unit, "operands"))
     case, interval = run.case, unit.initiation_interval
@@ -33,7 +36,7 @@ def test_dark_beats_bypass_the_specular_unit(name):
     total = found.cycles[-1] - found.cycles[0]
     assert interval * (lit - 1) <= total <= interval * (lit + starts) + 2 * np.count_nonzero(dark)
     if "gated" in case.beats:
-        # Spans without a highlight: the last beats of 20 that are gated together.
+        # Spans without a highlight: the last beats of 20 that the gate stops together.
         gated = case.beats["gated"].reshape(-1, 20).all(axis=1)
         ends = 20 * np.flatnonzero(gated) + 19
         assert len(ends) > 3

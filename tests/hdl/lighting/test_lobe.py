@@ -1,5 +1,5 @@
 # amaranth: UnusedElaboratable=no
-"""Lobe unit: beats without a highlight, and refusals; `tests.formal` has its writes and its terms."""
+"""Lobe unit: beats without a highlight, and refusals. `tests.formal` proves its writes and its terms."""
 
 from dataclasses import replace
 
@@ -19,7 +19,7 @@ LOBE = Lobe(operand=CHORD)
 
 
 def beats_of(unit, table, seed=0):
-    """Beats of the record, at the ends of every step, a tenth of them dark; and the model's terms."""
+    """Beats of the record at the ends of every step, a tenth of them dark, and the model's terms."""
     beats = RECORD.stimuli["highlights"].make(unit, np.random.default_rng(seed), 1300).beats
     operand = Fixed(unit.model.operand_format, beats["operand"])
     return beats, unit.model.compute(operand, beats["dark"], table).codes
@@ -27,7 +27,7 @@ def beats_of(unit, table, seed=0):
 
 @pytest.mark.parametrize("operand", OPERANDS)
 def test_dark_beats_do_not_toggle(operand):
-    """Of beats that are dark or behind, only the input's and the first registers change."""
+    """For beats that are dark or behind, only registers of the input and the first registers change."""
     model = Lobe(operand=operand)
     table = model.table(20)
     unit = LobeUnit(model, tables=[table])
@@ -39,7 +39,7 @@ def test_dark_beats_do_not_toggle(operand):
     assert {"argument", "zeros", "memory_0_0", "memory_0_1", "memory_0_fraction", "product", "term"} < set(
         registers
     )
-    # The first register is of the operand.
+    # The first register holds the operand.
     del registers["one_minus_cosine"]
     seen = []
     rng = np.random.default_rng(3)
@@ -66,7 +66,7 @@ def test_dark_beats_do_not_toggle(operand):
     assert len(behind) > 3
     *dark, _ = seen[:100]
     assert all(now == dark[0] for now in dark)
-    # All of them move once there is light.
+    # All of them change if there is light.
     assert all(any(now[name] != dark[0][name] for now in seen[99:]) for name in registers)
 
 

@@ -1,5 +1,5 @@
 # amaranth: UnusedElaboratable=no
-"""Exact power unit: times, resets; `tests.test_units` holds it against its model."""
+"""Exact power unit: times, resets. `tests.test_units` compares it with its model."""
 
 from blysk.bench.units.lighting.power import RECORD
 from blysk.bench.units.record import Case, first
@@ -15,7 +15,7 @@ def test_times_as_stated():
 
 
 def test_reset_in_mid_power():
-    """The sequential form, on any cycle of a power: the next is raised as from power-up."""
+    """The sequential form is reset in any cycle of a power. It computes the next power as after power-up."""
     unit = RECORD.variants["sequential, of a chord"].unit()
     case = next(RECORD.runs(unit, "highlights")).case
     case = Case(first(case.beats, 6), case.constants)

@@ -1,5 +1,5 @@
 # amaranth: UnusedElaboratable=no
-"""Specular unit: times, words of every exponent, refusals; `tests.test_units` holds it against its model."""
+"""Specular unit: times, words of every exponent, refusals. `tests.test_units` compares it with its model."""
 
 import numpy as np
 import pytest
@@ -16,7 +16,7 @@ from ..variants import mostly_long
 
 MODELS = SPECULAR_MODELS + FURTHER_MODELS
 
-# Products, and the latency at initiation intervals of 1, 2, 3, 4 and 6, as the docstring has them.
+# Products, and the latency at initiation intervals of 1, 2, 3, 4 and 6, as in the docstring.
 TIMING = {
     "cosquad": (2, 7, 13, 12, 13, 12),
     "cosquad_q": (2, 7, 13, 12, 13, 12),
@@ -50,7 +50,8 @@ def test_times_and_multipliers_at_every_interval(reflection):
 
 @pytest.mark.parametrize("reflection", mostly_long(MODELS, "cosquad_lin", "cosquad_q", "exp"))
 def test_slopes_of_every_exponent(reflection):
-    """Every word that a unit needs of an exponent against the reflection's tables, two cycles after it.
+    """Every word that a unit needs for an exponent equals the reflection's tables, two cycles after the
+    exponent.
 
     The boundary comes from a memory and its register, a cycle later.
     """
@@ -81,7 +82,7 @@ def test_slopes_of_every_exponent(reflection):
     ("reflection", "tables", "interval"), [("cosquad", 0, 1), ("coscos4", 128 * 36 + 64 * 33, 3)]
 )
 def test_shared_slope_saves_the_prom(reflection, tables, interval):
-    """The slope from outside: at the same cycles, and no PROM in the unit."""
+    """A slope from outside comes in the same cycles, and the unit then has no PROM."""
     model = Specular(REFLECTION_MODELS[reflection])
     unit = SpecularUnit(model, initiation_interval=interval, shares_slope=True)
     assert unit.latency == SpecularUnit(model, initiation_interval=interval).latency

@@ -1,5 +1,5 @@
 # amaranth: UnusedElaboratable=no
-"""Transfer unit: what it costs; `tests.test_units` holds every input against its model."""
+"""Transfer unit: its cost. `tests.test_units` compares every input with its model."""
 
 import pytest
 
@@ -8,7 +8,7 @@ from blysk.hdl.lighting.transfer import TransferUnit
 
 
 def test_a_table_and_no_multiplier():
-    """14,336 bits; a port a channel, or one for all channels in turn."""
+    """The table has 14,336 bits, and a port for each channel, or a single port for all channels in turn."""
     times = []
     for options in ({}, {"initiation_interval": 3}, {"channels": 1}):
         unit = TransferUnit(**options)

@@ -14,7 +14,10 @@ from blysk.hdl.methods.light_products import LightProductsUnit
 @pytest.mark.parametrize("operand", ["cosine", "one_minus_cosine"])
 @pytest.mark.parametrize("stimulus", RECORD.stimuli)
 def test_products_are_exact_integers(operand, stimulus):
-    """N.L and N.H whole; the chord of halved differences from a difference of 1 on, cut to 25 bits."""
+    """N.L and N.H are exact.
+
+    The chord has halved differences from a difference of 1 on, and is cut to 25 bits.
+    """
     unit = LightProductsUnit(LinearInterpolator(operand=operand), 3)
     case = next(RECORD.runs(unit, stimulus)).case
     found, normals = RECORD.expect(unit, case), case.beats

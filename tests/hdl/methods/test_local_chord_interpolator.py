@@ -1,7 +1,7 @@
 # amaranth: UnusedElaboratable=no
-"""The local chord method: multipliers, latencies, a pixel in every cycle for spans of any length.
+"""The local chord method: multipliers, latencies, and a pixel in every cycle for spans of any length.
 
-`tests.test_units` holds the unit against its model under stalls.
+`tests.test_units` compares the unit with its model under stalls.
 """
 
 from functools import cache
@@ -27,7 +27,7 @@ CI = [pytest.mark.long, pytest.mark.ci]
 
 @cache
 def unit_of():
-    """One light, by the default options, the same for all tests: it is compiled once."""
+    """A unit with one light and the default options. All tests share it, so that it is compiled once."""
     return make()
 
 
@@ -46,13 +46,16 @@ FIGURES = {
     (1, 6): (2, None),
     (2, 3): (5, None),
 }
-"""Multipliers and latency, of numbers of lights and setup intervals."""
+"""Multipliers and latency, for numbers of lights and setup intervals."""
 
 
 @pytest.mark.long
 @pytest.mark.parametrize(("lights", "interval"), FIGURES)
 def test_multipliers_and_latency(lights, interval):
-    """All of 18 bits; none of them a pixel's. The first pixel of a long span comes after the latency."""
+    """All multipliers have 18 bits, and none works for each pixel.
+
+    The first pixel of a long span comes after the latency.
+    """
     unit = make(lights, setup_interval=interval)
     multipliers, latency = FIGURES[lights, interval]
     assert unit.multipliers == multipliers
@@ -86,9 +89,9 @@ LENGTHS = {
 @pytest.mark.long
 @pytest.mark.parametrize("length", runs_of(LENGTHS))
 def test_a_pixel_in_every_cycle(length):
-    """Spans of any length, mixed: from the first pixel of a long span on one in every cycle."""
+    """Spans of any length are mixed. From the first pixel of a long span on, a pixel comes in every cycle."""
     unit = unit_of()
-    # A span of three pixels comes first: short ones then wait for it, and none comes before its turn.
+    # A span of three pixels comes first, and shorter spans wait for it. So no pixel comes before its turn.
     length = np.array([3, *length])
     case = case_of(unit, length)
     run = simulate(unit, case.beats, count=int(length.sum()), constants=case.constants, engine="auto")
@@ -101,7 +104,7 @@ def test_a_pixel_in_every_cycle(length):
 @pytest.mark.long
 @pytest.mark.parametrize("length", [1, 2])
 def test_short_spans_come_sooner(length):
-    """By the cycles of the setup: nothing of them goes through it."""
+    """Short spans come sooner by the cycles of the setup, because they do not pass the setup."""
     unit = unit_of()
     case = case_of(unit, np.full(50, length))
     run = simulate(unit, case.beats, count=50 * length, constants=case.constants, engine="auto")
@@ -113,7 +116,7 @@ def test_short_spans_come_sooner(length):
 @pytest.mark.ci
 @pytest.mark.long
 def test_waiting_output_holds_the_input():
-    """While no pixel is taken as many spans enter as fit, then none; afterwards all leave in a row."""
+    """While no pixel is taken, spans enter until the unit is full. Afterwards all pixels leave in a row."""
     unit = unit_of()
     length = np.tile([4, 1, 3, 2], 40)
     case = case_of(unit, length)

@@ -1,4 +1,4 @@
-"""Adaptive normaliser: its cycles and its FIFO; `tests.test_units` has its results."""
+"""Adaptive normaliser: its cycles and its FIFO. `tests.test_units` checks its results."""
 
 import numpy as np
 import pytest
@@ -13,7 +13,7 @@ from ...checks import assert_beats_equal
 
 
 def run_of(unit, angles, lengths, **stalls):
-    """Spans at given angles: a run that equals the model, and their levels."""
+    """Spans at given angles: a run that equals the model, and the levels of the spans."""
     case = spans_of(code_pairs_at(np.random.default_rng(1), len(lengths), angles), lengths)
     run = simulate(unit, case.beats, count=lengths.sum(), engine="auto", **stalls)
     assert_beats_equal(run.beats, RECORD.expect(unit, case))
@@ -35,14 +35,14 @@ def test_one_normal_in_every_cycle_of_a_span(variant):
 
 
 def test_preparation_as_stated():
-    """Of spans that find all parts free."""
+    """The time to prepare a span that finds all parts free is as stated."""
     unit = AdaptiveNormaliserUnit()
     angles = np.r_[1.0, 0.0, 8, 16, 32, 44, 80, 120, 3, 3, 4, 80, 80, 80]
     lengths = np.r_[2, 60, 5, 5, 9, 17, 17, 30, 1, 1, 2, 1, 2, 3]
     run, levels = run_of(unit, angles, lengths, input_stalls=np.arange(700) != 0)
     np.testing.assert_array_equal(levels, [0, 0, 1, 2, 3, 4, 4, 0, 0, 0, 0, 4, 4, 4])
     first = run.cycles[np.cumsum(lengths) - lengths] - run.input_cycles
-    # One pixel, or two, are the ends, and the middle one of three is the first level's.
+    # One pixel, or two, are the ends. The middle pixel of three belongs to the first level.
     stated = np.array([unit.preparation(k) for k in [*levels[:-3].tolist(), 0, 0, 1]])
     np.testing.assert_array_equal(first, np.where(lengths == 1, 50, stated))
     assert [unit.preparation(k) for k in range(3)] == [63, 77, 142]
@@ -55,7 +55,7 @@ def test_intervals_as_stated():
         lengths = np.full(12, (1 << level) + 1)
         run, levels = run_of(unit, np.full(12, angle), lengths)
         assert set(levels.tolist()) == {level}
-        # The first two find the segments' part free.
+        # The first two spans find the segments' part free.
         assert set(np.diff(run.input_cycles)[1:].tolist()) == {unit.interval(level)}
         assert set(np.diff(run.cycles[lengths[0] :: lengths[0]]).tolist()) == {unit.interval(level)}
     assert [unit.interval(k) for k in range(3)] == [33, 42, 70]
@@ -67,9 +67,9 @@ def test_long_spans_follow_without_a_gap():
 
 
 def test_front_runs_ahead_until_the_fifo_is_full():
-    """While the output waits: spans of one pixel are one segment each."""
+    """While the output waits, spans of one pixel have one segment each."""
     unit, wait = AdaptiveNormaliserUnit(), 6000
     stalls = np.arange(2 * wait) < wait
     run, _ = run_of(unit, np.linspace(0, 3, 100), np.ones(100, dtype=np.int64), output_stalls=stalls)
-    # One span more is in each of the three parts.
+    # Each of the three parts holds a further span.
     assert (run.input_cycles < wait).sum() == (2 << unit.model.depth) + 3

@@ -1,4 +1,4 @@
-"""Chain of bisections: its cycles; `tests.test_units` has its results."""
+"""Chain of bisections: its cycles. `tests.test_units` checks its results."""
 
 import numpy as np
 import pytest
@@ -12,7 +12,7 @@ from blysk.sim.engines.simulate import simulate
 @pytest.mark.long
 @pytest.mark.parametrize("variant", RECORD.variants)
 def test_latency_by_level(variant):
-    """A level of 0, a counter of 4 bits that goes round, counts as 16."""
+    """A level of 0 counts as 16, because a counter of 4 bits wraps."""
     unit = RECORD.variants[variant].unit()
     left, right = code_pairs_at(np.random.default_rng(1), 31, 30)
     level = np.r_[1:16, 15:-1:-1]

@@ -1,5 +1,5 @@
 # amaranth: UnusedElaboratable=no
-"""Difference setup: orders and tables of shorter spans; `tests.test_units` has its results."""
+"""Difference setup: orders, and tables of shorter spans. `tests.test_units` checks its results."""
 
 import pytest
 

@@ -1,4 +1,4 @@
-"""Quadratic evaluators: their cycles; `tests.test_units` has their results."""
+"""Quadratic evaluators: their cycles. `tests.test_units` checks their results."""
 
 import numpy as np
 import pytest
@@ -40,6 +40,7 @@ def test_short_spans_come_seven_cycles_apart(unit):
     run = run_of(unit, lengths, 3)
     np.testing.assert_array_equal(run.input_cycles, 7 * np.arange(len(lengths)))
     span, index = pixels_of(lengths)
-    # The polynomial takes a pixel in every cycle (horner: every second, counted from a pixel inside).
+    # The polynomial takes a pixel in every cycle. The form horner takes one in every second cycle, counted
+    # from a pixel inside.
     late = run.cycles - (run.input_cycles[span] + unit.latency + unit.cycles_per_pixel * index)
     assert np.all((late >= 0) & (late < unit.cycles_per_pixel))

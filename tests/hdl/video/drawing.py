@@ -1,4 +1,4 @@
-"""A `DrawUnit` with one output stream, and its bands by simulation: pixels, cycles and counters."""
+"""A `DrawUnit` with one output stream, and its simulated bands: pixels, cycles and counters."""
 
 from dataclasses import dataclass
 
@@ -13,7 +13,7 @@ from blysk.sim.engines.simulate import simulate
 
 
 class MergedDrawUnit(wiring.Component):
-    """Pixels, and after the last pixel of a band a beat with ``done``."""
+    """Output beats: pixels, and after the last pixel of a band a beat with ``done``."""
 
     def __init__(self, model):
         self.model, self.unit = model, DrawUnit(model)
@@ -31,7 +31,7 @@ class MergedDrawUnit(wiring.Component):
         )
 
     def elaborate(self, platform):
-        """A pixel goes before ``done``; the buttons keep the value of the last request."""
+        """A pixel goes before ``done``. The buttons keep the value of the last request."""
         m = Module()
         m.submodules.unit = unit = self.unit
         buttons = Signal(4, name="buttons")
@@ -42,7 +42,7 @@ class MergedDrawUnit(wiring.Component):
             unit.request.valid.eq(self.i.valid),
             self.i.ready.eq(unit.request.ready),
             unit.buttons.eq(buttons),
-            # A beat that waits must not change, where there is no pixel either.
+            # A beat that waits must not change, also where it has no pixel.
             Value.cast(self.o.payload.pixel).eq(Mux(unit.pixels.valid, Value.cast(unit.pixels.payload), 0)),
             self.o.payload.band.eq(unit.done.payload),
             self.o.payload.done.eq(~unit.pixels.valid),
@@ -56,9 +56,9 @@ class MergedDrawUnit(wiring.Component):
 
 @dataclass(frozen=True)
 class DrawnBands:
-    """Bands in the order in which they were asked for.
+    """Bands in the order of their requests.
 
-    Cycles of a band are those from its request to its ``done``, with the clearing after the previous band.
+    The cycles of a band go from its request to its ``done``, with the clearing after the band before.
     """
 
     band: np.ndarray
@@ -74,7 +74,7 @@ class DrawingSimulator:
         self.drawing, self.unit = drawing, MergedDrawUnit(drawing)
 
     def run(self, bands, buttons=None, **stalls):
-        """Ask for bands, and collect their pixels; ``buttons`` are pressed from each request on."""
+        """Request bands, and collect their pixels. ``buttons`` are pressed from each request on."""
         mesh = self.drawing.mesh
         run = simulate(
             self.unit,

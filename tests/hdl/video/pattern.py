@@ -1,4 +1,4 @@
-"""A source of bands in place of a renderer: a pattern that moves, a pixel a cycle, with pauses."""
+"""A source of bands in place of a renderer: a moving pattern, one pixel a cycle, with pauses."""
 
 import numpy as np
 from amaranth.hdl import Cat, Module, Signal
@@ -11,7 +11,8 @@ __all__ = ["PatternTop", "picture"]
 
 
 class PatternTop(wiring.Component):
-    """A display whose bands hold ``(x, y, x ^ y ^ frame)`` in every pixel but those of every eighth column.
+    """A display whose bands hold ``(x, y, x ^ y ^ frame)`` in every pixel, except those of every eighth
+    column.
 
     Without ``moves`` every frame is the first.
     """

@@ -1,5 +1,6 @@
 # amaranth: UnusedElaboratable=no
-"""Bands through two clocks: each is shown as it was drawn last or as background, at any speed of drawing."""
+"""Bands through two clocks: each band is shown as it was drawn last, or as background, at any speed of
+drawing."""
 
 import numpy as np
 import pytest
@@ -17,7 +18,10 @@ FRAMES = 3
 
 
 class Drawing:
-    """Pixels of any band of any frame, some drawn twice, some beside it; what a band was drawn as last."""
+    """A source of random bands: some are drawn twice, some pixels are outside.
+
+    It keeps the last drawing of each band.
+    """
 
     def __init__(self, model):
         self.model, self.frame, self.asked = model, -1, []
@@ -42,7 +46,8 @@ class Drawing:
 
 
 def show(model, wait, periods=(1.0, 1.37), frames=FRAMES):
-    """Frames that are shown, those that should be, late bands, the buffer's counts, and the bands asked for.
+    """Frames that are shown, frames that should be shown, late bands, the buffer's counters, and the
+    requested bands.
 
     ``wait`` gives the cycles that a band takes beside its pixels.
     """
@@ -114,7 +119,7 @@ def pictures(model, frames):
     ],
 )
 def test_every_frame_in_time(model, periods):
-    """At several clocks, formats and backgrounds."""
+    """With several clocks, formats and backgrounds."""
     frames, status, _ = show(model, lambda count: count % 7, periods)
     np.testing.assert_array_equal(frames[:FRAMES], pictures(model, FRAMES))
     assert status == {"late_bands": 0, "frames": FRAMES + 1}
@@ -141,9 +146,10 @@ def is_background(model, frames):
 
 @pytest.mark.parametrize(("wait", "left_out"), [(260, True), (1200, False)])
 def test_late_bands_are_background_and_counted(wait, left_out):
-    """The timing goes on; every band is one that was drawn, whole, or background; as many as are counted.
+    """The timing goes on. Every band is a whole drawn band or background, and background bands are counted.
 
-    After a late one the band of the next slot is asked for: some are left out, or none if all take that long.
+    After a late band the band of the next slot is requested. So some bands are left out, or none if each
+    takes that long.
     """
     model = BandBuffer(MODE, 4, RGB888, (3, 2, 1))
     frames, status, drawing = show(model, lambda count: wait, (1.0, 1.4))
@@ -151,7 +157,7 @@ def test_late_bands_are_background_and_counted(wait, left_out):
     assert late.any()
     assert late.sum() == status["late_bands"]
     assert (np.diff(drawing.asked) % model.bands > 1).any() == left_out
-    # Everything that was drawn, by band.
+    # All drawings, by band.
     again, drawn = Drawing(model), {}
     for band in drawing.asked:
         again.band(band)

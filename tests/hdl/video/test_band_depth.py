@@ -13,16 +13,16 @@ SIZE = 5, 3
 
 @pytest.mark.parametrize("tag_bits", [2, 3])
 def test_reads_are_those_of_the_band(tag_bits):
-    """40 bands, some without a write: a tag that came round unswept would show an old depth.
+    """There are 40 bands, some without a write. If a tag came round without a sweep, an old depth would show.
 
-    Places outside a band are clear, and what is written there is lost.
+    Places outside a band are clear, and writes there are lost.
     """
     model, rng = BandDepth(SIZE, tag_bits), np.random.default_rng(tag_bits)
     count = 600
     begins = rng.random(count) < 0.1
     begins[0] = True
     writes = rng.random(count) < 0.3
-    # Long runs of bands without a write at all: words of the bands before wait for their sweep.
+    # In long runs of bands without a write, words of earlier bands wait for their sweep.
     writes[200:400] = False
     anywhere = rng.random(count) < 0.3
     x = rng.integers(0, np.where(anywhere, 8, SIZE[0]))

@@ -14,7 +14,8 @@ def test_presses_and_frames_equal_model():
     state = model.start
 
     async def hold(ctx, button, level):
-        """Seven cycles of bounces, fewer than from a sample to the next, then steady."""
+        """Seven cycles of bounces, which are fewer than from one sample to the next, and then a steady
+        level."""
         for value in [*rng.integers(0, 2, 7).tolist(), *[level] * 16]:
             ctx.set(dut.buttons, value << BUTTONS.index(button))
             await ctx.tick()

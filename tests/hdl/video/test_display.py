@@ -1,5 +1,5 @@
 # amaranth: UnusedElaboratable=no
-"""Display RTL down to the bits of the lanes, equal to the model's; late bands leave the lanes whole."""
+"""Display RTL down to the bits of the lanes equals the model. Late bands leave the lanes whole."""
 
 from fractions import Fraction
 
@@ -37,16 +37,16 @@ def test_lanes_decode_to_the_frames(rate, model):
 @pytest.mark.ci
 @pytest.mark.long
 def test_too_heavy():
-    """The lanes stay whole; late bands are background, counted, and the others are right."""
+    """The lanes stay whole. Late bands are background and are counted, and the other bands are right."""
     found = shown(900, "3/4", frames=8)
     empty = (found.frames == PARAMETERS.background).all((-1, -2)).reshape(8, 4, 4).all(-1)
     assert 0 < empty.sum() < empty.size
-    # A band more may have been late before the counters were read.
+    # A further band may have been late before the counters were read.
     assert found.status["late_bands"] in (empty.sum(), empty.sum() + 1)
     for frame, bands in zip(found.frames, empty, strict=True):
         for band in np.flatnonzero(~bands):
             lines = slice(4 * band, 4 * band + 4)
-            # Band 0, of which the pattern counts the frames, may have been among the late ones.
+            # The pattern counts frames by band 0, which may have been among the late bands.
             drawn = (picture(PARAMETERS, number)[lines] for number in range(9))
             assert any((frame[lines] == lines_drawn).all() for lines_drawn in drawn)
 

@@ -1,5 +1,5 @@
 # amaranth: UnusedElaboratable=no
-"""Timing RTL equal to its model on every cycle of two frames, and after a reset in between."""
+"""Timing RTL equals its model in every cycle of two frames, and after a reset between them."""
 
 import pytest
 from amaranth.hdl import ResetInserter, Signal

@@ -43,7 +43,7 @@ def simulator():
 
 
 def expected(drawing, bands, buttons=None):
-    """Pixels of each band, and what is counted."""
+    """Pixels of each band, and the counters."""
     controls, state, before, down = drawing.controls, drawing.controls.start, drawing.bands, 0
     made = []
     for index, band in enumerate(bands):
@@ -51,7 +51,7 @@ def expected(drawing, bands, buttons=None):
         if band <= before:
             state = controls.advance(state)
             frame = state
-        # The press counts some cycles later: this frame has begun.
+        # The press counts some cycles later, when this frame has begun.
         for k, button in enumerate(BUTTONS):
             if (now & ~down) >> k & 1:
                 state = controls.press(state, button)
@@ -69,7 +69,7 @@ def assert_equal(found, made):
 @pytest.mark.ci
 @pytest.mark.long
 def test_frames_equal_model(simulator):
-    """Two frames; every counter is the sum of the bands'."""
+    """Two frames equal the model. Every counter is the sum over the bands."""
     drawing = simulator.drawing
     bands = [*range(drawing.bands)] * 2
     found, made = simulator.run(bands), expected(drawing, bands)
@@ -86,7 +86,10 @@ def test_frames_equal_model(simulator):
 
 @pytest.mark.long
 def test_stalls_change_no_pixel_and_no_band_after_them(simulator):
-    """Stalls on both sides, then none: the last half of the bands left takes the cycles as from reset."""
+    """There are stalls on both sides, and then none.
+
+    The last half of the remaining bands takes as many cycles as from a reset.
+    """
     bands, rng = [*range(simulator.drawing.bands)] * 6, np.random.default_rng(5)
     free = simulator.run(bands)
     end = int(free.cycles.sum()) // 2
@@ -103,7 +106,7 @@ def test_stalls_change_no_pixel_and_no_band_after_them(simulator):
 
 @pytest.mark.long
 def test_bands_may_be_left_out(simulator):
-    """A band that does not follow the one before begins a frame, the first of all too."""
+    """A band whose number does not follow the band before begins a frame. So does the first band of all."""
     bands = [2, 3, 1, 3, 3, 0, 2]
     found = simulator.run(bands)
     assert_equal(found, expected(simulator.drawing, bands))
@@ -112,7 +115,10 @@ def test_bands_may_be_left_out(simulator):
 
 @pytest.mark.long
 def test_buttons_count_from_the_next_frame_on(simulator):
-    """Each button in turn, in the second band of a frame; in a pause a step."""
+    """Each button is pressed in turn, in the second band of a frame.
+
+    While the motion is stopped, a press makes a step.
+    """
     count = simulator.drawing.bands
     presses = ["light", "material", "step", "pause", "step", "light"]
     buttons = np.zeros((len(presses) + 1, count), dtype=int)
@@ -126,7 +132,10 @@ def test_buttons_count_from_the_next_frame_on(simulator):
 @pytest.mark.long
 @pytest.mark.parametrize("lights", [1, 2])
 def test_highlights_of_phong_follow_the_light(lights):
-    """The light changes after the first frame: L and axes of the new one count before the first triangle."""
+    """The light changes after the first frame.
+
+    L and the axes of the new light are there before the first triangle.
+    """
     drawing = drawing_of(64, (48, 32), preset("quotient", "phong", lights=lights, materials=2))
     bands = [*range(drawing.bands)] * 3
     buttons = [0, 1 << BUTTONS.index("light"), *[0] * (len(bands) - 2)]
@@ -137,7 +146,10 @@ def test_highlights_of_phong_follow_the_light(lights):
 
 @pytest.mark.long
 def test_a_teapot_of_1000_triangles_at_640_by_480():
-    """Whole frames as the board shows them, and their cycles: 60 frames a second at 75 MHz twice over."""
+    """Whole frames as the board shows them.
+
+    Their cycles are enough for twice 60 frames a second at 75 MHz.
+    """
     drawing = drawing_of(1000, (640, 480), board_design())
     drawing = replace(drawing, controls=replace(drawing.controls, step=1))
     bands = [*range(drawing.bands)] * 2

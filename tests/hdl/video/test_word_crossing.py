@@ -13,7 +13,7 @@ WORDS = 60
 
 
 def cross(phase, jitter):
-    """Words taken, and the serial cycles on which they were."""
+    """Words taken, and the serial cycles in which they were taken."""
     m = Module()
     m.domains.pixel = pixel = ClockDomain("pixel")
     m.submodules.crossing = crossing = WordCrossing(unsigned(10))
@@ -47,9 +47,12 @@ def cross(phase, jitter):
 @pytest.mark.parametrize("phase", [0.0, 0.03, 0.25, 0.47, 0.5, 0.53, 0.8, 0.97])
 @pytest.mark.parametrize("jitter", [0.0, 0.15])
 def test_each_word_once(phase, jitter):
-    """From the first on that is taken after the counter is set; edges may coincide, and move."""
+    """Every word is taken once, from the first that comes after the counter is set.
+
+    Clock edges may coincide, and move.
+    """
     found = cross(phase, jitter)
-    # The counter is set by the first word or the second.
+    # The first or the second word sets the counter.
     found = found[found[:, 1] > 2]
     assert len(found) > WORDS - 6
     assert (np.diff(found[:, 0]) == 5).all()
@@ -57,7 +60,7 @@ def test_each_word_once(phase, jitter):
 
 
 def test_output_cells():
-    """The model sends what it was given, two cycles later."""
+    """The model sends its input two cycles later."""
     cells = OutputCells(2)
     simulator = Simulator(cells)
     simulator.add_clock(1e-6, domain="serial")
