@@ -42,8 +42,8 @@ class SceneTriangles:
         is off by up to 16 steps of 2^-24 of the range of 1/W. At r times the least W this is ``r 2^-20`` of
         W. If r is over 1,000, surfaces 0.1 % apart may change places.
     several_levels : int
-        Number of triangles at whose corners the level of the texture differs by more than 1. A triangle is
-        drawn with a single level, see `triangle_levels`.
+        Number of triangles in the picture at whose corners the level of the texture differs by more than 1. A
+        triangle is drawn with a single level, see `triangle_levels`.
     levels : int64 array, shape (faces,)
         Level of each face of the mesh; 0 without textures.
     """
@@ -150,17 +150,20 @@ def scene_triangles(
         material=mesh.material[source].astype(np.int64),
         two_sided=scene.two_sided[source],
     )
-    several, levels = 0, np.zeros(whole, dtype=np.int64)
+    spread, levels = np.zeros(len(source), dtype=np.int64), np.zeros(whole, dtype=np.int64)
     if surface is not None:
         places: dict[str, np.ndarray] = {}
         if surface.coordinates:
-            places, levels, several = _placed(scene, source, records)
+            places, levels, spread = _placed(scene, source, records)
         triangles = replace(triangles, surface=_surface_codes(records[..., 7:], w), **places)
     triangles = _turned(scene, triangles, source)
     far = 0
     if scene.camera.projection == "perspective" and len(w):
         far = int((w.max(axis=1) > _DEEPEST * w.min()).sum())
-    counts = int((cut & present).sum()), int((~present).sum()), far, several
+    low, high = position.min(axis=1), position.max(axis=1)
+    start, end = (np.array(of) * grid.steps for of in ((frame.left, frame.top), (frame.right, frame.bottom)))
+    several = (spread > 1) & ((low < end) & (high > start)).all(axis=1)
+    counts = int((cut & present).sum()), int((~present).sum()), far, int(several.sum())
     return SceneTriangles(triangles, frame, source, *counts, levels)
 
 
@@ -200,11 +203,10 @@ def _surface_of(scene: Scene, surface: AttributeSpans) -> np.ndarray:
 
 def _placed(
     scene: Scene, source: np.ndarray, records: np.ndarray
-) -> tuple[dict[str, np.ndarray], np.ndarray, int]:
-    """Placement of texture coordinates, and levels of faces.
+) -> tuple[dict[str, np.ndarray], np.ndarray, np.ndarray]:
+    """Placement of texture coordinates, levels of faces, and their spread, see `triangle_levels`.
 
-    In ``records`` attributes from -1 to 1 replace the texture coordinates. The third result is the number of
-    triangles with several levels.
+    In ``records`` attributes from -1 to 1 replace the texture coordinates.
     """
     check_texels(scene)
     coordinates = records[..., -2:]
@@ -215,7 +217,7 @@ def _placed(
     period = AttributeSpans.PERIOD
     moved = np.where(periodic, (base + period // 2) % period - period // 2, base)
     records[..., -2:] = (texels - base[:, np.newaxis]) * np.ldexp(1.0, -found)[:, np.newaxis, np.newaxis]
-    return {"base": moved, "range": found, "level": level}, levels, int((spread > 1).sum())
+    return {"base": moved, "range": found, "level": level}, levels, spread
 
 
 def _surface_codes(attributes: np.ndarray, w: np.ndarray) -> np.ndarray:

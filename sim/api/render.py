@@ -15,6 +15,7 @@ from blysk.golden.geometry.scene_triangles import check_texels
 from blysk.golden.lighting.intensity import MAX_LIGHTS
 from blysk.golden.pipeline import ShadingPipeline
 from blysk.golden.presets import METHODS, MIRROR_LOBES, PUBLISHED
+from blysk.golden.reference.divide import divided
 from blysk.golden.reference.scene import Scene
 from blysk.golden.render import Renderer
 from blysk.sim.api.design import built, design_of, refused_counts
@@ -151,11 +152,11 @@ def prepare_rendering(
     start = perf_counter()
     with settings.located():
         made = _built(settings, design or _design(settings))
+        software = settings["geometry"] == "software"
         stage("loading the mesh")
         most = MAX_LIGHTS if design is None else design.lights
         local = design is None and _serves_local(settings)
         albedo = design is None or design.albedo is not None
-        software = settings["geometry"] == "software"
         loaded = load(settings, lights=most, local=local, albedo=albedo, cutoffs=software)
         if loaded.lights and design is None:
             made = _built(settings, _design(settings))
@@ -163,6 +164,8 @@ def prepare_rendering(
         simulator, used = None, "cxxrtl"
         while True:
             scenes = tuple(scenes_of(loaded, settings, frames or 1))
+            if not software:
+                scenes = tuple(map(divided, scenes))
             made = _built(settings, made)
             if design is None:
                 made = _fitted(made, scenes[0], settings)

@@ -17,6 +17,7 @@ from PIL import Image
 from blysk.golden.frames.compare import compare, compare_triangles
 from blysk.golden.pipeline import ShadingPipeline
 from blysk.golden.reference.camera import Camera
+from blysk.golden.reference.divide import divided
 from blysk.golden.reference.geometry import normalise
 from blysk.golden.reference.scene import Scene
 from blysk.golden.render import Renderer
@@ -173,6 +174,7 @@ def render_frame(animation: Animation, camera: Camera) -> AnimationFrame:
     with _ONE_AT_A_TIME:
         scene = replace(animation.scene, camera=camera)
         if animation.design.build.takes_triangles:
+            scene = divided(scene)
             design, size = animation.design, (scene.width, scene.height)
             simulator = _triangle_simulator(design, animation.engine, size)
             drawn = simulator.render(scene)
