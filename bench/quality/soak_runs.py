@@ -73,7 +73,7 @@ WIDEST = 44
 """Largest angle between the normals of a span, in degrees. Methods for angles under 45 degrees accept it."""
 
 _PART, _BATCH = 10**7, 250_000
-"""Largest number of pixels of a task, and of a batch, without the last span of each."""
+"""Largest numbers of pixels of a task and of a batch. The last span of each may go beyond."""
 
 _IDLE_TIMEOUT = 10_000
 

@@ -132,9 +132,9 @@ def text(points: Sequence[Mapping[str, Any]]) -> list[str]:
     engines = f"The simulated RTL computed {len(simulated):,} frames"
     if modelled:
         engines += (
-            f". Its bit-accurate model computed {len(modelled):,} frames. The cycles of these frames are "
-            "those of a simulated pipeline of the same method with the same spans, plus the difference of "
-            "latency. If there is none, the cycle model gives the cycles"
+            f". Its bit-accurate model computed {len(modelled):,} frames. A simulated pipeline of the "
+            "same method with the same spans gives their cycles. The difference of latency is added. Without "
+            "this simulation the cycle model gives the cycles"
         )
     return [*map(_glance, _by_scene(points).values()), of_error, of_time, f"{engines}."]
 

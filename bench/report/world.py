@@ -88,7 +88,7 @@ _OWN = {
 
 
 def own(method: str, model: str, date: str) -> dict[str, str]:
-    """Quantities of `OTHERS` of a pipeline of this project, by the committed figures of place and route.
+    """The quantities of `OTHERS` for a pipeline of this project, from committed figures of place and route.
 
     Parameters
     ----------

@@ -107,13 +107,13 @@ def _expect(unit, case):
 
 
 def _spans(unit, rng, count):
-    """Spans of every length, most of them short. They cross up to 512 texels, with ratios of depths to 16."""
+    """Spans of every length, most of them short. A span crosses up to 512 texels, and depths up to 1:16."""
     length = np.maximum(short_lengths(rng, count, 1) % (1 << unit.length_bits), 1)
     return Case(_beats(unit, quantised_spans(rng, unit.model, length)[0], length))
 
 
 def _words(unit, rng, count):
-    """Any words, steps and exponents, so that sums wrap. Spans have 0 to 40 pixels, or a power of two."""
+    """Any words, steps and exponents, so that sums wrap. Pixels are 0 to 40, or a power of two."""
     length = rng.choice([0, 0, 1, 1, 1, 2, 2, 3, 4, 5, 9, 40], count)
     length[:12] = rng.permutation(1 << np.arange(12)) % (1 << unit.length_bits)
     p = unit.model
@@ -137,7 +137,7 @@ def _long_spans(unit, rng, count):
 
 
 def _measure(rng, count, model):
-    """Words along spans, in steps of 2^-23, against the scaled lines between the true ends."""
+    """Words of pixels in steps of 2^-23, against straight lines between exact scaled values at the ends."""
     length = log_lengths(rng, max(count // 450, 16))
     spans, (left, right), (near, far) = quantised_spans(rng, model, length)
     words = model.compute(spans, length)

@@ -76,5 +76,5 @@ RECORD = Record(
         "alone": Stimulus(_alone, 300, stalled=False, repeats=12),
     },
     axis="",
-    still={"the address behind level 0 depends only on the constants of a run": "behind[0-10]"},
+    still={"the address after level 0 depends only on the constants of a run": "behind[0-10]"},
 )

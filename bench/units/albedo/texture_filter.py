@@ -42,7 +42,7 @@ def _expect(unit, case):
 
 
 def _texels(unit, rng, count):
-    """Any texels and weights. Some texels are equal, 0 or 1, and some weights are 0 or 1."""
+    """Any texels and weights. Some texels are equal. Some texels, and some weights, are 0 or 1."""
     texels = any_codes(rng, _TEXEL, count, 4, 3)
     texels[::4] = rng.choice([0, _TEXEL.max_code], texels[::4].shape)
     texels[1::8] = texels[1::8, :1]

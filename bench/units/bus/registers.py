@@ -36,7 +36,7 @@ def _expect(unit, case):
 
 
 def _accesses(unit, rng, count, busy=0):
-    """Reads and writes of registers and other addresses. Most values fit. Values are read back."""
+    """Reads and writes at addresses of registers and at others. Most values fit. Values are read back."""
     registers = unit.model.registers
     chosen = rng.integers(0, len(registers), count)
     address = np.array([register.address for register in registers])[chosen]
@@ -66,7 +66,7 @@ def _accesses(unit, rng, count, busy=0):
 
 
 def _busy(unit, rng, count):
-    """Reads and writes of registers and other addresses, while a frame is inside."""
+    """Reads and writes at addresses of registers and at other addresses, while a frame is inside."""
     return _accesses(unit, rng, count, 1)
 
 

@@ -63,7 +63,7 @@ def _measure(rng, count, unit):
         )
     phases = (pixel / (length - 1) - 0.5) * np.stack([angle, early, late])
     exact, early, late = x * np.cos(phases) + y * np.sin(phases)
-    # At the border of two segments of arccos, rounding chooses the segment. The formula takes the same.
+    # At the border of two segments of arccos, rounding chooses a segment. The formula takes this segment.
     formula = np.where(np.abs(found - early) < np.abs(found - late), early, late)
     return Sample(found, exact, formula, degrees_between(left, right)[:, 0])
 

@@ -39,7 +39,7 @@ def _pairs(unit, rng, count):
 
 
 def _corners(unit, rng, count):
-    """Components that differ by 1, or by a step less or more than 1; largest differences; extreme codes."""
+    """Components that differ by 1, or by 1 plus or less a step; largest differences; extreme codes."""
     ends = word_ends(rng, count, 6)
     border = [[ONE, 0, 0, ONE - d, 0, 0] for d in (2**17 - 1, 2**17, 2**17 + 1)]
     border.append([COMPONENT.min_code] * 3 + [COMPONENT.max_code] * 3)

@@ -262,8 +262,10 @@ RECORD = Record(
         "for a length of 12 bits the shift is at most 12, and the square's shift at most 25": (
             "shift[4] square_shift[5]"
         ),
-        "a reciprocal, and its square, has 17 bits and is not negative": "multiplier_{0,1}_{1,b}[17]",
-        "the shifter has five fraction bits more than the slope of u times 1/(m - 1)": "shifter_0_0[0-4]",
+        "a reciprocal and its square have 17 bits, and are not negative": "multiplier_{0,1}_{1,b}[17]",
+        "the shifter has five fraction bits more than the product of the slope of u and 1/(m - 1)": (
+            "shifter_0_0[0-4]"
+        ),
         "the shifter has twelve or thirteen fraction bits more than the other products": (
             "shifter_1_0[0-11]"
         ),

@@ -101,7 +101,7 @@ RECORD = Record(
     axis="angle, degrees",
     waivers={
         "operands": (
-            "The fault changes operands only while the output is stalled. They have been read by then."
+            "The fault changes operands only while the output is stalled. By then they have been read."
         ),
         "multiplier_0_?_0": "No operand of the multiplier is negative, so the sign is 0 already.",
     },

@@ -24,7 +24,7 @@ def _measure(rng, count, unit, shortcut=False):
     step = psi / (length - 1)
     phase = rng.uniform(-np.pi, np.pi, len(length))
     amplitude = rng.uniform(0, 1 - 2.0**-16, len(length))
-    # The shortcut is cos d = 1 - (1 - cos psi)/(m - 1)^2. Its half angle gives d without loss of digits.
+    # The shortcut is cos d = 1 - (1 - cos psi)/(m - 1)^2. The sine of psi/2 gives d without loss of digits.
     taken = 2 * np.arcsin(np.sin(psi / 2) / (length - 1)) if shortcut else step
     states = unit.states(*unit.start(amplitude, phase, step), *unit.coefficient(taken), int(length.max()))
     k = np.arange(len(states.codes))[:, np.newaxis]
@@ -34,7 +34,7 @@ def _measure(rng, count, unit, shortcut=False):
         first, second = (amplitude * np.cos(phase - n * step) for n in (0, 1))
         rise = second - first + 2 * first * np.square(np.sin(taken / 2))
         ratio = k * np.sinc(k * taken / np.pi) / np.sinc(taken / np.pi)
-        # In a wide span this is up to 1.1. The word of a result does not hold 1.1.
+        # In a wide span the formula gives up to 1.1. The word of a result does not hold 1.1.
         limit = unit.result_format.max_code * unit.result_format.step
         formula = np.clip((first * np.cos(k * taken) + rise * ratio)[inside], -1, limit)
     pixel = np.broadcast_to(k, inside.shape)[inside]

@@ -120,8 +120,8 @@ RECORD = Record(
     },
     waivers={
         "*_first": (
-            "The bit is below the bits of a cosine, where the word has zeros. Or the word has been read by "
-            "then."
+            "The bit is below the bits of a cosine, where the word has zeros. Or the fault changes the word "
+            "after it has been read."
         ),
         "*_x_0": "The controlling bit is below the bits of a cosine, where x has zeros.",
         "span_aligned": (

@@ -13,7 +13,7 @@ __all__ = ["RECORD"]
 
 
 def _spans(unit, rng, count, longest=37, most=1 << 24, lines=None):
-    """Overlapping spans of a small picture. Their depths are less than ``most``, or the largest depth."""
+    """Overlapping spans of a small picture. A depth is less than ``most``, or is the largest depth."""
     given = unit.model
     longest = min(longest, given.width)
     length = rng.integers(1, longest + 1, count)
@@ -138,7 +138,7 @@ RECORD = Record(
     axis="",
     waivers={"place": "The fault changes the order in which words are swept. Every word is still swept."},
     still={
-        "fresh falls once after a reset, and used rises once": "fresh[0] used[0]",
+        "`fresh` falls once after a reset, and `used` rises once": "fresh[0] used[0]",
         "only after a reset are all 30 words swept, else 5 words": "left[3-4]",
         "a scanline has six words, so the place of its first word is even": "span[12]",
     },

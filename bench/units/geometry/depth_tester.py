@@ -52,7 +52,7 @@ def _few(unit, rng, count):
 
 
 def _same(unit, rng, count):
-    """Spans of one or two pixels in a corner, at places that were written on the last cycles."""
+    """Spans of one or two pixels in a corner, at places that were written a few cycles before."""
     return _case(rng, count, (2, 1), 2, (1 << 24) - 1)
 
 

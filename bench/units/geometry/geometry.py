@@ -31,7 +31,7 @@ def _random(unit, rng, count, size, spread):
 
 
 def _small(unit, rng, count):
-    """Triangles of all kinds in a small picture. Its borders cut them on every side."""
+    """Triangles of all kinds in a small picture. Some cross the borders of the picture, on every side."""
     return Case(_random(unit, rng, count, 6.0, 0.3).beats, small_frame(rng).codes)
 
 

@@ -76,7 +76,7 @@ RECORD = Record(
     still={
         "the lower half of a word is narrower than a multiplier's operand": "multiplier_1_{b,1}[9-17] "
         "multiplier_2_{a,0}[16-17]",
-        "rise is a difference of attributes, and has one fraction bit more": "rise[0]",
+        "`rise` has one fraction bit more than the attributes whose difference it is": "rise[0]",
         "the fraction ends with a constant 1, for half a step": "fraction_word[0]",
         "the shifter's operand has a 0 below its word, for the rounding": "shifter_0_0[0]",
     },

@@ -54,7 +54,7 @@ def _pixel(unit, rng, count):
 
 RECORD = Record(
     name="span_clip",
-    title="Scanlines of triangles cut to the picture",
+    title="Scanlines of triangles, clipped to the picture",
     source="[T] figure 4.10",
     variants={"": Variant(SpanClipUnit, note="exact")},
     expect=_expect,

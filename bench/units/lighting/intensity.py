@@ -108,7 +108,7 @@ def _bright(unit, rng, count):
 
 
 def _colors(unit, rng, count):
-    """Light of up to eight full channels, over the limit of light, on surfaces of every albedo."""
+    """Light that exceeds its limit, with colours up to eight full channels, on surfaces of every albedo."""
     return _terms(unit, rng, count, 8)
 
 

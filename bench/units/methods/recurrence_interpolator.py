@@ -39,7 +39,7 @@ def _radian(unit, rng, count):
 
 RECORD = Record(
     name="recurrence_interpolator",
-    title="Cosines of equal steps on the great circle, one product each",
+    title="Cosines at equal steps on the great circle, one product for each cosine",
     source="docs/theory/interpolation.md#recurrence; [T] 3.3, figure 3.5",
     variants={
         "recurrence": measured(_RECURRENCE),

@@ -65,7 +65,7 @@ def _measure(rng, count, chain):
         np.where(apart, np.sin(psi - part) / sine, 1 - 2.0**-level),
         np.where(apart, np.sin(part) / sine, 2.0**-level),
     )
-    # Near the limit, rounding decides which polynomial the unit takes. The formula is the nearer result.
+    # Near the limit, rounding decides which polynomial the unit takes. The formula takes the same polynomial.
     limits = model.widest_narrow.values + np.array([-8, 8]) * model.ANGLE_FORMAT.step
     early, late = (
         np.clip(vectors(*_weights(chain, dot(a, b), level, limit)), -1, _LENGTH) for limit in limits

@@ -46,7 +46,7 @@ def spans_of(unit, rng, length):
 
 
 def _spans(unit, rng, count):
-    """Starts and differences of any size. Spans are short, a few are long, and some have no pixel."""
+    """Starts and differences of any size. Most spans are short, a few are long, and some have no pixel."""
     return spans_of(unit, rng, short_lengths(rng, count))
 
 

@@ -51,7 +51,7 @@ def spans_of(rng, length):
 
 
 def _spans(unit, rng, count):
-    """Coefficients of any size. Spans are short, a few are long, and some have no pixel."""
+    """Coefficients of any size. Most spans are short, a few are long, and some have no pixel."""
     return spans_of(rng, short_lengths(rng, count))
 
 
