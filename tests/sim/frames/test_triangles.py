@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from blysk.golden.frames.triangle_frame import triangle_frame
+from blysk.golden.geometry.scene_triangles import SceneTriangles
 from blysk.golden.geometry.triangles import FrameSettings
 from blysk.golden.geometry.vertex_sort import VertexSort
 from blysk.golden.reference.raster import rasterise
@@ -66,6 +67,18 @@ def test_small_triangles_with_two_lanes():
     )
     assert len(frame.sent.triangles) == 10_712
     assert frame.pixels <= frame.cycles <= 1.1 * frame.pixels
+
+
+@pytest.mark.parametrize(("albedo", "row"), [(None, 4), ("colors,nearest", 10)])
+def test_a_high_triangle_may_be_silent_for_long(monkeypatch, albedo, row):
+    """A compact core walks its scanlines outside of the picture in as many cycles as there are attributes."""
+    monkeypatch.setattr(TriangleSimulator, "_check", lambda simulator: None)
+    renderer = Renderer(design(style="compact", albedo=albedo).built(top="render", style="compact"))
+    high = TriangleSimulator(renderer, SIZE)
+    triangles = sample_triangles(renderer, SIZE)[:1]
+    triangles.x[:], triangles.y[:] = [0, 256, 512], [-2048 * 256, 0, 2047 * 256]
+    sent = SceneTriangles(triangles, FrameSettings.centred(*SIZE), np.zeros(1, dtype=int), 0, 0)
+    assert row * 4095 + 10_000 < high._longest_silence(sent) < row * 4095 + 12_000
 
 
 ENDS = [(1, 1), (1, 2), (2, 1), (1, 4095), (4095, 1), (4085, 3), (4086, 3), (3, 4086), (4095, 4095)]
