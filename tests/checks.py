@@ -1,4 +1,4 @@
-"""How RTL is held against its bit-accurate model, whatever the unit."""
+"""Comparisons of RTL with its bit-accurate model, for any unit."""
 
 from collections.abc import Mapping
 from weakref import WeakKeyDictionary
@@ -18,7 +18,7 @@ from blysk.sim.engines.simulate import simulate
 __all__ = ["assert_beats_equal", "assert_equals_model", "assert_keeps_rate", "known", "resets"]
 
 FEWEST = 16
-"""Beats of which a rate is asserted, at least."""
+"""Least number of beats for which a rate is checked."""
 
 
 def assert_beats_equal(actual, expected, path="beat"):
@@ -30,7 +30,10 @@ def assert_beats_equal(actual, expected, path="beat"):
 
 
 class Counted(Wrapped):
-    """A unit, with the number of cycles on which each of its flags is high as status."""
+    """A unit that also counts, for each of its flags, the cycles in which the flag is high.
+
+    The counts are its status.
+    """
 
     def __init__(self, unit: Component):
         self.flags = flags_of(unit)
@@ -48,7 +51,7 @@ _counted: WeakKeyDictionary[Component, Counted] = WeakKeyDictionary()
 
 
 def with_status(unit: Component, run) -> Component:
-    """The unit itself, or the one that counts its flags, the same for all its runs."""
+    """The unit itself, or the unit that counts its flags. All runs of the unit share it."""
     if run.status is None or "status" in unit.signature.members:
         return unit
     if unit not in _counted:
@@ -57,24 +60,24 @@ def with_status(unit: Component, run) -> Component:
 
 
 def known(unit: Component) -> Component:
-    """The component by which a unit is compiled: itself, or the one that counts its flags."""
+    """The component by which a unit is compiled: the unit itself, or the unit that counts its flags."""
     return _counted.get(unit, unit)
 
 
 def assert_equals_model(unit, run, engine="auto"):
-    """Every beat, the status, and of a pipelined unit without stalls every cycle."""
+    """Check every beat and the status. For a pipelined unit without stalls, check every cycle."""
     case, component = run.case, with_status(unit, run)
-    # A compact geometry of ten attributes walks over 4096 scanlines without pixels in 40,960 cycles.
+    # A compact geometry with ten attributes walks over 4096 scanlines without pixels in 40,960 cycles.
     options = {**case.sent, "idle_timeout": 50_000, **run.stalls}
     found = simulate(component, case.beats, count=run.count, engine=engine, **options)
     assert_beats_equal(found.beats, run.expected)
     if run.status is not None:
         assert {name: found.status[name] for name in run.status} == run.status
     if isinstance(unit, PipelinedUnit) and not run.stalls:
-        # Writes come before the first beat, one a cycle.
+        # Writes come before the first beat, one in each cycle.
         start = 0 if case.write is None else found.input_cycles[0]
         latency, interval, number = unit.latency, unit.initiation_interval, np.arange(run.count)
-        # Without a skid buffer each result stops the unit for a cycle, and the inputs that come after it.
+        # Without a skid buffer each result stops the unit for a cycle, and also the inputs behind it.
         stops = np.zeros(run.count, dtype=int) if unit.skid else number
         before = np.minimum(stops, np.maximum(0, number + 1 - -(-latency // interval)))
         np.testing.assert_array_equal(found.input_cycles, start + number * interval + before)
@@ -83,12 +86,13 @@ def assert_equals_model(unit, run, engine="auto"):
 
 
 def assert_keeps_rate(unit, run, free, pace=None, engine="auto"):
-    """Stalls for half of the beats, then none: the last half of the beats left comes as from reset.
+    """Check the rate after stalls: stalls for half of the beats, then none.
 
-    Of a pipelined unit every beat comes after its interval. Where the data decide, the same beats take as
-    many cycles as without stalls, and at most a gap more that the run has from reset: a place in shared slots
-    is another, and a FIFO that was full is empty. With a ``pace`` they take that many cycles a beat, too.
-    Where too few beats leave, inputs count.
+    The last half of the remaining beats must come as after a reset. In a pipelined unit every beat comes
+    after its interval. If the data decide, the same beats take as many cycles as without stalls, and at most
+    one gap more that the run after a reset has. The gap is allowed because a beat may get another place in
+    shared slots, and because a full FIFO may be empty. With a ``pace`` the beats also take that many cycles
+    each. If too few beats leave, inputs count.
 
     Parameters
     ----------
@@ -109,15 +113,15 @@ def assert_keeps_rate(unit, run, free, pace=None, engine="auto"):
         if left >= FEWEST:
             break
     if max(len(found.cycles), len(found.input_cycles)) < 4 * FEWEST:
-        # No rate: a few operands, at which beats alone matter.
+        # There is no rate for a few operands, where only the beats matter.
         return
     assert left >= FEWEST, f"{left} beats are left after the stalls"
     steps, usual = (np.diff(cycles[-(left // 2) :]) for cycles in (after, before))
     if isinstance(unit, PipelinedUnit):
         np.testing.assert_array_equal(steps, unit.initiation_interval + (not unit.skid))
         return
-    # A gap of another part of the run counts only if it came after the stalls: beside a long gap a rate that
-    # locks would pass.
+    # A gap of another part of the run counts only if it came after the stalls. Otherwise a rate that locks
+    # would pass beside a long gap.
     gap = max(usual.max(), min(steps.max(), np.diff(before).max()))
     assert steps.sum() <= usual.sum() + gap, f"{name}: {steps.sum()} cycles, from reset {usual.sum()}"
     if pace is not None:
@@ -125,16 +129,17 @@ def assert_keeps_rate(unit, run, free, pace=None, engine="auto"):
 
 
 def resets(unit, case: Case, befores, cycles, count=6):
-    """Cycles from the first input, and payloads, of the outputs: after power-up, and the same after resets.
+    """Cycles from the first input, and payloads, of the outputs: after power-up, and after resets, where they
+    must be the same.
 
-    The first beats are answered; others are inside on the reset.
+    The first beats are answered. Other beats are inside when the reset comes.
     """
     packed = words_of(unit.i, case.beats)
     writes = [] if case.write is None else words_of(unit.write, case.write)
     reset, found = Signal(), []
 
     async def send(context, port, words):
-        """Beats of a stream, each until it is accepted."""
+        """Send the beats of a stream, each until it is accepted."""
         sent = 0
         while sent < len(words):
             context.set(port.valid, 1)

@@ -1,4 +1,4 @@
-"""What all tests share: the order of their groups, interrupts, compiled models."""
+"""Parts that all tests share: the order of their groups, interrupts, compiled models."""
 
 import gc
 import importlib.util
@@ -18,18 +18,18 @@ from blysk.hdl.emit.processes import Process
 from .decided import Decided
 from .lists import OF_DOCUMENTS
 
-# A test that is killed leaves no program behind, nor does a run of tests with its workers.
+# A test that is killed leaves no program behind. Neither does a run of tests with its workers.
 subprocess.Popen = Process
 
 BY_UNIT = ("tests/test_units.py", "tests/formal/test_units.py", "tests/bench/tools/test_pages.py")
-"""Files whose tests of a unit are a group."""
+"""Files in which the tests of a unit are a group."""
 
 BESIDE = {
     "tests/bench/report/test_report_browser.py": "tests/bench/report/test_report.py",
     "tests/bench/web/test_web_inside.py": "tests/bench/web/test_web_browser.py",
     "tests/test_citations.py": "tests/test_house.py",
 }
-"""Files in the group of another file: report, site, and parsed sources of both are made once."""
+"""Files in the group of another file, because both share a report, a site, or parsed sources."""
 
 LONGEST = (
     "tests/sim/cli/test_bad_input.py",
@@ -43,18 +43,21 @@ LONGEST = (
     "tests/bench/tools/test_place_and_route.py",
     "tests/bench/quality/test_mutants.py",
 )
-"""Beginnings of the groups that take the longest: workers begin with them."""
+"""Beginnings of the names of the groups that take longest. Workers begin with them."""
 
 
 def group_of(nodeid):
-    """Tests that one worker runs, as they share what they make: those of a file or two, or of a unit."""
+    """The group of a test.
+
+    One worker runs a group, because its tests share what they make: those of a file or two, or of a unit.
+    """
     group, _, test = nodeid.partition("::")
     group = BESIDE.get(group, group)
     return group + re.sub(r"^\w+(\[\w+)?.*", r"\1", test) if group in BY_UNIT else group
 
 
 class Groups(LoadScopeScheduling):
-    """Whole groups to each worker."""
+    """Give whole groups to each worker."""
 
     def _split_scope(self, nodeid):
         return group_of(nodeid)
@@ -68,7 +71,8 @@ SELDOM = (
 
 
 def pytest_itemcollected(item):
-    """`make test` leaves the tests of the units in `SELDOM`, by the names of their files, to CI."""
+    """Leave the tests of the units in `SELDOM` to CI, by the names of their files; `make test` does not run
+    them."""
     given = {mark.name for mark in item.iter_markers()}
     if item.path.stem.removeprefix("test_") in SELDOM and not given & {"long", "prove"}:
         item.add_marker("long")
@@ -77,9 +81,10 @@ def pytest_itemcollected(item):
 
 @pytest.hookimpl(trylast=True)
 def pytest_collection_modifyitems(items):
-    """The groups in `LONGEST` first, then those of the most tests: at the end no worker waits for another.
+    """Sort tests: first the groups in `LONGEST`, then the groups with most tests, so that no worker waits for
+    another at the end.
 
-    Workers collect files in two orders, and run them in this one.
+    Workers collect files in two orders, and run tests in this order.
     """
     count = Counter(group_of(item.nodeid) for item in items)
 
@@ -92,7 +97,7 @@ def pytest_collection_modifyitems(items):
 
 @pytest.hookimpl(wrapper=True)
 def pytest_make_collect_report(collector):
-    """Of two workers one begins with the last file: the bytecode of each is made by one of them."""
+    """Let one of two workers begin with the last file, so that each makes the bytecode of other files."""
     report = yield
     worker = getattr(collector.config, "workerinput", {}).get("workerid", "gw0")
     if isinstance(collector, pytest.Dir) and int(worker[2:]) % 2:
@@ -101,15 +106,15 @@ def pytest_make_collect_report(collector):
 
 
 def pytest_collection_finish():
-    """Modules and tests stay until the end: collection of garbage need not look at them again and again.
+    """Exclude modules and tests, which stay until the end, from the collection of garbage.
 
-    A pipeline is many objects, all of which live until it is translated: a tenth of that time was collection.
+    A pipeline is many objects, which all live until it is translated. A tenth of that time was collection.
     """
     gc.freeze()
     gc.set_threshold(50_000)
 
 
-# Examples are drawn, and they are the same in every run.
+# Examples are random, and the same in every run.
 hypothesis.settings.register_profile("blysk", derandomize=True, database=None)
 hypothesis.settings.load_profile("blysk")
 
@@ -120,27 +125,29 @@ def pytest_xdist_make_scheduler(config, log):
 
 
 def pytest_configure():
-    """Interrupts as at a terminal, of workers too: a shell starts its background jobs with them ignored."""
+    """Take interrupts as at a terminal, also in workers, because a shell starts background jobs that ignore
+    them."""
     if threading.current_thread() is threading.main_thread():
         signal.signal(signal.SIGINT, signal.default_int_handler)
 
 
 @pytest.fixture(scope="session", autouse=True)
 def model_cache(tmp_path_factory, worker_id, pytestconfig):
-    """Compiled models of this run, shared by its workers."""
+    """Folder of the compiled models of this run, which its workers share."""
     shared = tmp_path_factory.getbasetemp()
     if worker_id != "master":
         shared = shared.parent
     with pytest.MonkeyPatch.context() as patch:
         patch.setenv("BLYSK_CACHE", str(Path(shared) / "models"))
-        # Of few cycles the compiler takes most of the time; with -O1 a model runs as fast as with -O2.
+        # In runs of few cycles the compiler takes most of the time. A model compiled with -O1 is as fast as
+        # with -O2.
         patch.setenv("CXXFLAGS", "-O0" if "not long" in pytestconfig.option.markexpr else "-O1")
         yield
 
 
 @pytest.fixture(scope="session")
 def decided():
-    """What was decided before, and need not be decided again."""
+    """Statements that were decided before, and need not be decided again."""
     decided = Decided.read()
     yield decided
     decided.keep()
@@ -148,7 +155,7 @@ def decided():
 
 @pytest.fixture
 def uninstalled(monkeypatch):
-    """Let a package be not installed, as far as a search for it tells."""
+    """Make a package look as if it were not installed, for code that searches for it."""
 
     def uninstalled(package):
         find = importlib.util.find_spec

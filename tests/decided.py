@@ -1,4 +1,5 @@
-"""What was decided before, known by digests: proofs, and runs of units in structures that change seldom."""
+"""Statements that were decided before, known by digests: proofs, and runs of units in structures that change
+seldom."""
 
 import hashlib
 import os
@@ -14,8 +15,8 @@ __all__ = ["Decided", "digest_of"]
 class Decided:
     """Digests of statements that were found true before.
 
-    A digest is that of all that the statement says, the netlist of the unit among it. Where a unit or a
-    statement about it changes, the digest is another, and the statement is decided anew.
+    A digest covers all of the statement, also the netlist of the unit. If a unit or a statement about it
+    changes, the digest changes, and the statement is decided again.
 
     Parameters
     ----------
@@ -29,7 +30,7 @@ class Decided:
     """
 
     FILE = Path(__file__).with_name("decided.txt")
-    """Digests that `make decided` has written, one a line."""
+    """Digests that `make decided` has written, one in each line."""
 
     def __init__(self, digests: Iterable[str]):
         self._known = set(digests)
@@ -37,7 +38,7 @@ class Decided:
 
     @classmethod
     def read(cls) -> "Decided":
-        """What `FILE` has."""
+        """The digests in `FILE`."""
         return cls(cls.FILE.read_text(encoding="ascii").split())
 
     def knows(self, digest: str) -> bool:
@@ -51,14 +52,14 @@ class Decided:
         self.used.add(digest)
 
     def keep(self) -> None:
-        """Append what was used to the file that the variable ``DECIDED`` names, if it names one."""
+        """Append the used digests to the file that the variable ``DECIDED`` names, if it names a file."""
         if path := os.environ.get("DECIDED"):
             with open(path, "a", encoding="ascii") as file:
                 file.writelines(f"{digest}\n" for digest in sorted(self.used))
 
 
 def digest_of(*parts: Any) -> str:
-    """Digest of texts, numbers, arrays, and of mappings and sequences of them."""
+    """Digest of texts, numbers, arrays, and of mappings and sequences of these."""
     digest = hashlib.sha256()
     for text in _texts(parts):
         digest.update(b"%d:" % len(text))

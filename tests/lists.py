@@ -1,4 +1,4 @@
-"""Names of reflection models by family, and of units, for parametrised tests."""
+"""Names of reflection models by family, and names of units, for parametrised tests."""
 
 from blysk.golden.presets import MODELS
 from blysk.golden.reference.reflection import REFLECTION_MODELS, AngleCosine, PolynomialModel
@@ -14,14 +14,16 @@ __all__ = [
 ]
 
 SPECULAR_MODELS = ("cosquad", "cosquad7", "cosquad_lin")
-"""Those of the documents' figures, all of one latency."""
+"""Models of the documents' figures, all with the same latency."""
 
 FURTHER_MODELS = tuple(name for name in MODELS if name not in (*SPECULAR_MODELS, "blinn_product"))
-"""The others that the specular unit serves."""
+"""The other models that the specular unit serves."""
 
 KINDS = tuple({type(unit.reflection): name for name, unit in MODELS.items()}.values())
-"""A model of each kind of specular unit. Methods meet models at a stream: what a method is to send depends on
-the kind alone."""
+"""A model of each kind of specular unit.
+
+Methods and models meet at a stream, so the data that a method sends depend only on the kind.
+"""
 
 LINE_MODELS = tuple(name for name, model in REFLECTION_MODELS.items() if isinstance(model, PolynomialModel))
 """Powers of a line."""
@@ -46,10 +48,10 @@ OF_DOCUMENTS = (
     *("middle_normal", "quadratic_evaluator", "quadratic_interpolator", "gpq", "line_setup"),
     *("half_chord", "difference_setup", "linear_interpolator"),
 )
-"""Units of the documents' methods alone, which change seldom."""
+"""Units that only the documents' methods have. They change seldom."""
 
 WHOLE = (
     *("geometry", "render", "pixel_pipelines", "framing", "registers", "serialiser", "motion"),
     *("draw_commands", "mesh_memory", "vertex_unit", "triangle_assembly", "tmds_encoder"),
 )
-"""Units that are no parts: parts of geometry and of pipelines are in these."""
+"""Units that are no parts of geometry or of pipelines."""

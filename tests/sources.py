@@ -1,4 +1,4 @@
-"""Python sources, parsed: what tests of the text share."""
+"""Parsed Python sources, for tests of the text."""
 
 import ast
 from collections.abc import Iterator
@@ -11,7 +11,7 @@ _BLOCKS = ("body", "orelse", "finalbody", "handlers", "cases")
 
 @cache
 def tree(source: str) -> ast.Module:
-    """A source, parsed once for all tests of a worker."""
+    """A parsed source. All tests of a worker share it."""
     return ast.parse(source)
 
 

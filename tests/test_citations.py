@@ -1,4 +1,4 @@
-"""Citations: every page, section and key that code, tests and pages refer to exists; so does every link."""
+"""Citations: every page, section and key that code, tests and pages cite exists, and so does every link."""
 
 import ast
 import io
@@ -20,7 +20,7 @@ PROJECT = Path(__file__).parents[1]
 THEORY = PROJECT / "docs" / "theory"
 
 OLD = ("blocks.md", "chord.md", "models.md", "numbers.md", "pipeline.md")
-"""Documents that are not in the project, and are still cited; `old_citations` lists where."""
+"""Documents that are not in the project and are still cited; `old_citations` lists the places."""
 
 ANCHORS = {
     "models.md": "lighting reflection-models energy-normalised-forms shading-methods image-metrics "
@@ -34,7 +34,7 @@ ANCHORS = {
     "video.md": "vertices bands display tmds",
     "units.md": "specular-unit exact-power highlight-gate intensity pipeline frame-constants lobe",
 }
-"""Sections that docstrings may cite, whether one does or not."""
+"""Sections that docstrings may cite. They must exist, also if no docstring cites them."""
 
 _PATH = re.compile(r"(?<![\w/])docs/[\w./-]*\.md(?:#[\w-]+)?")
 _KEY = re.compile(r"\[([A-Z][A-Za-z]*\d{0,2})\]")
@@ -54,7 +54,7 @@ class Text(NamedTuple):
 
 
 def files(suffix: str) -> list[Path]:
-    """Files of the project, without what is generated or hidden."""
+    """Files of the project, without generated and hidden files."""
     found = []
     for folder, inner, names in os.walk(PROJECT):
         # An environment in the clone has as many files as a hundred projects.
@@ -71,7 +71,7 @@ def files(suffix: str) -> list[Path]:
 
 
 def prose_of(path: Path, source: str, comments: bool = True) -> Iterator[Text]:
-    """Docstrings and comments of a Python source; strings that are values are not among them."""
+    """Docstrings and comments of a Python source, without strings that are values."""
     for node in statements(source):
         if isinstance(node, ast.Expr) and isinstance(getattr(node.value, "value", None), str):
             yield Text(path, node.lineno, node.value.value)
@@ -83,7 +83,7 @@ def prose_of(path: Path, source: str, comments: bool = True) -> Iterator[Text]:
 
 @cache
 def texts() -> list[Text]:
-    """All that may cite: docstrings and comments of the code, and the pages."""
+    """All texts that may cite: docstrings and comments of the code, and the pages."""
     found = []
     for path in files(".py"):
         source = path.read_text(encoding="utf-8")
@@ -93,13 +93,13 @@ def texts() -> list[Text]:
 
 
 def slug(heading: str) -> str:
-    """Anchor that GitHub makes of a heading."""
+    """The anchor that GitHub makes from a heading."""
     plain = re.sub(r"\[([^\]]*)\]\([^)]*\)", r"\1", heading)
     return re.sub(r"[^\w\- ]", "", plain.strip().lower()).replace(" ", "-")
 
 
 def without_code(page: str) -> str:
-    """A page without its code, in which brackets are no links."""
+    """A page without its code, because brackets in code are no links."""
     page = re.sub(r"^```.*?^```", "", page, flags=re.DOTALL | re.MULTILINE)
     page = re.sub(r"^ {4}.*$", "", page, flags=re.MULTILINE)
     return re.sub(r"`[^`]*`", "``", page)
@@ -160,7 +160,7 @@ def wrong_links(path: Path, page: str) -> list[str]:
 
 
 def undefined_keys(page: str) -> list[str]:
-    """Keys in brackets of a page that are not made links at its end."""
+    """Keys in brackets on a page that have no link at its end."""
     plain = without_code(page)
     defined = set(re.findall(r"^\[(\w+)\]:", plain, re.MULTILINE))
     used = {key for key in re.findall(r"\[(\w+)\](?![(:\]\[])", plain) if key in keys()}
@@ -168,7 +168,7 @@ def undefined_keys(page: str) -> list[str]:
 
 
 def old_citations() -> list[str]:
-    """Places that still cite one of `OLD`, one line each."""
+    """Places that still cite a document of `OLD`, one in each line."""
     name = re.compile(rf"(?<![\w/])(?:{'|'.join(re.escape(old) for old in OLD)})\b(?!#)")
     found = []
     for text in texts():
@@ -182,7 +182,7 @@ def old_citations() -> list[str]:
 
 
 def every_wrong_name() -> dict[str, list[str]]:
-    """What is wrong, by the text that has it."""
+    """Wrong names, with the text that has them."""
     found: dict[str, list[str]] = {}
     for text in texts():
         wrong = wrong_citations(text.text) + wrong_keys(text.text)
@@ -219,7 +219,7 @@ def test_the_index_has_every_page():
 
 
 def test_there_is_something_to_check():
-    """Source lines are found, with their keys; so are citations, in docstrings and in comments."""
+    """Source lines are found with their keys, and citations are found in docstrings and in comments."""
     found = [source for text in texts() if text.path.suffix == ".py" for source in sources(text.text)]
     assert len(found) > 50
     assert {"T", "C", "B"} <= {key for source in found for key in _KEY.findall(source)}

@@ -1,4 +1,4 @@
-"""Digests: what differs in anything has another."""
+"""Digests: different things have different digests."""
 
 import numpy as np
 import pytest

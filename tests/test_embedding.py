@@ -28,7 +28,7 @@ def example():
 
 @pytest.fixture(scope="module")
 def expected(example):
-    """The picture by the model, from the numbers of the example and the constants of its description."""
+    """The picture of the model, from the numbers of the example and the constants of its description."""
     design = blysk.design(model="cosquad")
     triangle = Triangles(**{name: np.array(value)[np.newaxis] for name, value in example["TRIANGLE"].items()})
     towards = np.array([[0, 0, (1 << 17) - 1]])
@@ -43,7 +43,7 @@ def expected(example):
 
 
 def test_beat_of_the_guide():
-    """The guide's ten lines give the codes of the model, for spans of 1 to 4095 pixels."""
+    """The guide's code gives the codes of the model, for spans of 1 to 4095 pixels."""
     guide = (FOLDER.parents[1] / "docs" / "guide" / "embedding.md").read_text(encoding="utf-8")
     (text,) = (part for part in guide.split("```") if "def beat(" in part)
     made: dict = {}

@@ -1,4 +1,4 @@
-"""The examples run, and show what they say."""
+"""The examples run, and show what they state."""
 
 import json
 import re
@@ -31,7 +31,10 @@ def test_script(tmp_path):
 @pytest.mark.long
 @pytest.mark.parametrize("path", sorted(EXAMPLES.glob("*.ipynb")), ids=lambda path: path.name)
 def test_notebook(path, capsys):
-    """Code cells in one namespace, without a kernel: `nbclient` would bring one, and thirty packages."""
+    """Run code cells in one namespace, without a kernel.
+
+    `nbclient` would need a kernel and thirty packages.
+    """
     document = json.loads(path.read_text(encoding="utf-8"))
     cells = ["".join(cell["source"]) for cell in document["cells"] if cell["cell_type"] == "code"]
     assert not any(cell.get("outputs") for cell in document["cells"])

@@ -1,4 +1,4 @@
-"""The house: imports go one way and in no circle, files and functions are short, the wheel is whole."""
+"""The house: imports go one way and in no circle, files and functions are short, the wheel is complete."""
 
 import ast
 import graphlib
@@ -14,14 +14,14 @@ from .sources import statements, tree
 
 PROJECT = Path(__file__).parents[1]
 LAYERS = ("golden", "hdl", "sim", "bench")
-# What a layer may import apart from the standard library and the layers below; None is anything.
+# The packages that a layer may import, apart from the standard library and the layers below; None: any.
 LIBRARIES = {"golden": {"numpy", "scipy"}, "hdl": {"numpy", "scipy", "amaranth"}, "sim": None, "bench": None}
 NOT_IN_THE_WHEEL = {"blysk.bench.quality"}
-"""What measures the repository itself, with its tests."""
+"""Modules that measure the repository itself, with its tests."""
 
 
 def name_of(path: Path) -> str:
-    """Name by which a file of the project is imported."""
+    """The name by which a file of the project is imported."""
     parts = path.relative_to(PROJECT).with_suffix("").parts
     return ".".join(("blysk", *parts)).removesuffix(".__init__")
 
@@ -37,7 +37,7 @@ def nodes(source: str) -> tuple[ast.AST, ...]:
 
 
 def imports(source: str, package: str) -> set[str]:
-    """Names of all modules that a source imports, at any depth; of `from a import b` a and a.b."""
+    """Names of all modules that a source imports, at any depth. For `from a import b` these are a and a.b."""
     found = set()
     for node in nodes(source):
         if isinstance(node, ast.Import):
@@ -103,7 +103,7 @@ def test_a_wrong_import_is_found(layer, source):
 
 
 def test_no_import_goes_in_a_circle():
-    """Inside functions too: what must be imported late is in the wrong file."""
+    """Imports inside functions count, too. If an import has to be late, it is in the wrong file."""
     graph = {
         name: (imports(path.read_text(encoding="utf-8"), name) & set(FILES)) - {name}
         for name, path in FILES.items()
@@ -112,7 +112,7 @@ def test_no_import_goes_in_a_circle():
 
 
 def circle_of_rooms(graph: dict[str, set[str]]) -> list[str]:
-    """Rooms of one folder in a circle, if there is one: `graph` has the imports of every file.
+    """Rooms of a folder in a circle, if there is a circle. `graph` has the imports of every file.
 
     A room is a subfolder, or a file beside the subfolders.
     """
@@ -135,7 +135,7 @@ def circle_of_rooms(graph: dict[str, set[str]]) -> list[str]:
 
 
 def test_no_rooms_import_in_a_circle():
-    """In a layer, and in a folder of rooms inside it."""
+    """In each layer, and in each folder of rooms inside it."""
     graph = {
         name: (imports(path.read_text(encoding="utf-8"), name) & set(FILES)) for name, path in FILES.items()
     }
@@ -143,7 +143,7 @@ def test_no_rooms_import_in_a_circle():
 
 
 def test_a_circle_of_rooms_is_found():
-    """Though no file is in a circle."""
+    """A circle of rooms is found although no file is in a circle."""
     gate, method = "blysk.golden.lighting.highlight_gate", "blysk.golden.methods.interpolator"
     factor, linear = "blysk.golden.lighting.factor", "blysk.golden.methods.linear_interpolator"
     assert circle_of_rooms({gate: {method}, linear: {method}}) == []
@@ -155,11 +155,11 @@ STARTERS = {
     "blysk.hdl.emit.processes": "programs",
     "blysk.sim.frames.workers": "workers, which watch their parent",
 }
-"""Files that may start processes, and which."""
+"""Files that may start processes, and the calls that they may use."""
 
 
 def starts(source: str, package: str) -> set[str]:
-    """Calls and imports by which a source starts a process; its exceptions and constants start none."""
+    """Calls and imports by which a source starts a process. Its exceptions and constants start none."""
     calls = re.findall(
         r"\bsubprocess\.(?:run|Popen|call|check_call|check_output|getoutput)\b"
         r"|\bos\.(?:system|popen|fork|forkpty|posix_spawn\w*|spawn\w+)\(",
@@ -173,7 +173,7 @@ def starts(source: str, package: str) -> set[str]:
 
 
 def test_processes_end_with_their_parent():
-    """All are started by the files that see to it."""
+    """All processes are started by the files that end them."""
     found = {name: starts(path.read_text(encoding="utf-8"), name) for name, path in FILES.items()}
     assert {name for name, calls in found.items() if calls} == set(STARTERS)
 
@@ -187,17 +187,17 @@ def test_the_wheel_has_every_package():
 # Length.
 
 LINES, FUNCTION_LINES = 500, 100
-"""Lines of a file, and of a function but for its docstring."""
+"""Lines of a file, and of a function without its docstring."""
 
 LONG_FILES = {}
-"""Files over the limit, and why."""
+"""Files over the limit, and the reasons."""
 
 LONG_FUNCTIONS: dict[str, str] = {}
-"""Functions over the limit, and why."""
+"""Functions over the limit, and the reasons."""
 
 
 def long_functions(source: str) -> dict[str, int]:
-    """Lines of functions that are over the limit, but for their docstrings and what stands in them."""
+    """Lines of functions that are over the limit, without their docstrings."""
     found = {}
     for node in statements(source):
         if isinstance(node, ast.FunctionDef | ast.AsyncFunctionDef):

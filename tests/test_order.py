@@ -1,4 +1,4 @@
-"""The order of the groups of tests: the same in every run, whatever ran before."""
+"""The order of the groups of tests is the same in every run, whatever ran before."""
 
 from pathlib import Path
 from types import SimpleNamespace

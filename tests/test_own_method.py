@@ -41,7 +41,8 @@ print(json.dumps(found))
 
 @pytest.fixture
 def installed(tmp_path):
-    """A function of a module's text and its entry points: the environment of a process that has them."""
+    """A function that takes the text of a module and its entry points, and gives the environment of a process
+    that has them."""
 
     def install(text, points):
         folder = tmp_path / "site" / "own-1.dist-info"
@@ -69,7 +70,10 @@ def run(command, env, **options):
 
 
 def test_frame_and_table(nearest):
-    """The simulated frame is that of the model; it is off float64 by rounding, and exact normals by more."""
+    """The simulated frame equals the model's.
+
+    It differs from float64 by rounding, and from exact normals by more.
+    """
     done = run([sys.executable, "-c", RENDER], nearest)
     assert done.returncode == 0, done.stderr
     found = json.loads(done.stdout)
@@ -88,7 +92,7 @@ def test_frame_and_table(nearest):
 @pytest.mark.ci
 @pytest.mark.long
 def test_verilog_and_record(nearest, tmp_path):
-    """Its Verilog has no warning, and the tests of every unit find and pass its record."""
+    """Its Verilog has no warning. The tests of every unit find its record and pass."""
     path = tmp_path / "core.v"
     done = run(
         [*BLYSK, "verilog", "--method", "nearest", "--model", "cosquad", "--gate", "-o", path], nearest
@@ -123,7 +127,7 @@ def test_verilog_and_record(nearest, tmp_path):
     ],
 )
 def test_a_wrong_package_is_named(installed, text, reason):
-    """One line, for the program; it names the package and the remedy."""
+    """The program prints one line, which names the package and the remedy."""
     done = run([*BLYSK, "render", "--help"], installed(text, {"own": "own"}))
     assert (done.returncode, done.stdout) == (2, "")
     assert done.stderr.startswith(f"blysk: package own: {reason}; ")

@@ -1,4 +1,5 @@
-"""What a user installs: the wheel, what is in it, and that it renders with the oldest versions it allows."""
+"""The installation of a user: the wheel, its contents, and renders with the oldest versions that it
+allows."""
 
 import os
 import re
@@ -45,7 +46,8 @@ def run(*command: object, **options) -> str:
 @pytest.fixture(scope="module")
 def wheel(tmp_path_factory):
     folder = tmp_path_factory.mktemp("wheel")
-    # A copy of what is checked in: a build leaves folders behind, and what lies about does not belong in it.
+    # A copy of the committed files, because a build leaves folders behind, and other files do not belong in
+    # the wheel.
     files = run("git", "ls-files", "-z", cwd=PROJECT).split("\0")[:-1]
     for name in files:
         if (PROJECT / name).is_file():
@@ -77,21 +79,21 @@ def test_wheel_holds_the_packages_and_no_more(wheel):
     assert "blysk/py.typed" in names
     assert any(name.endswith("licenses/LICENSE") for name in names)
     unwanted = [name for name in names if re.search(r"/(test|conftest)|\.(png|gif|vcd|obj|glb|pyc)$", name)]
-    # What writes a bench to take away, and the bench.
+    # The writer of the bench to take away, and the bench.
     assert unwanted == ["blysk/sim/frames/testbench.py", "blysk/sim/frames/templates/test_pipeline.py"]
-    # Sources alone: data would be larger.
+    # Only sources; data would be larger.
     assert largest < 32_000
 
 
 @pytest.fixture(scope="module")
 def installed(wheel, tmp_path_factory):
-    """Python of a new environment with the wheel, and the libraries of this one."""
+    """Python of a new environment with the wheel and the libraries of this environment."""
     folder = tmp_path_factory.mktemp("installed")
     run(sys.executable, "-m", "venv", "--without-pip", folder)
     python = folder / "bin" / "python"
     run(sys.executable, "-m", "pip", "--python", python, "install", "-q", "--no-deps", "--no-index", wheel)
     (site,) = folder.glob("lib/python*/site-packages")
-    # A path in a .pth file is searched, but its own .pth files, as of this checkout, are not read.
+    # A path in a .pth file is searched. Its own .pth files, such as that of this checkout, are not read.
     libraries = [path for path in sys.path if Path(path).name in ("site-packages", "dist-packages")]
     (site / "libraries.pth").write_text("\n".join(libraries))
     return python
@@ -118,7 +120,8 @@ print(emit(record.variants[record.default].unit(), "unit").partition("module")[2
 @pytest.mark.ci
 @pytest.mark.long
 def test_wheel_in_a_project_with_packages_of_the_same_names(installed, tmp_path):
-    """A render, a Verilog, the table of units and a unit, beside a project's own hdl, sim and bench."""
+    """A render, a Verilog file, the table of units and a unit work beside a project's own hdl, sim and
+    bench."""
     for name in ("golden", "hdl", "sim", "bench", "tests"):
         (tmp_path / name).mkdir()
         (tmp_path / name / "__init__.py").write_text("raise ImportError('this is the project of a user')\n")
@@ -163,9 +166,9 @@ errors = (blysk.InputError, blysk.SimulationError, blysk.CompilerMissing)
 @pytest.mark.ci
 @pytest.mark.long
 def test_types_of_the_wheel(wheel, tmp_path):
-    """The public modules by mypy's defaults, and a program that uses every public name by ``--strict``.
+    """The public modules pass mypy's defaults, and a program that uses every public name passes ``--strict``.
 
-    Other modules are read for the types that they state, and not checked: `follow_imports = silent`.
+    mypy reads the types of other modules, and does not check them: `follow_imports = silent`.
     """
     with zipfile.ZipFile(wheel) as archive:
         archive.extractall(tmp_path / "site")
@@ -193,7 +196,7 @@ def test_types_of_the_wheel(wheel, tmp_path):
     reason="the oldest versions have wheels for the oldest Python only",
 )
 def test_wheel_renders_with_the_oldest_versions(wheel, tmp_path):
-    """The same picture as here, from a new environment that has nothing else."""
+    """The picture is the same as here, from a new environment that has nothing else."""
     from blysk.sim.cli.main import main
 
     python = tmp_path / "environment" / "bin" / "python"
@@ -204,7 +207,7 @@ def test_wheel_renders_with_the_oldest_versions(wheel, tmp_path):
     assert main([*RENDER, str(tmp_path / "new.png")]) == 0
     old, new = (np.asarray(Image.open(tmp_path / name)) for name in ("old.png", "new.png"))
     np.testing.assert_array_equal(old, new)
-    # The commands of the extras are there, and say what is missing.
+    # The commands of the extras are there, and name what is missing.
     done = subprocess.run([python.with_name("blysk"), "fpga"], capture_output=True, text=True, cwd=tmp_path)
     assert (done.returncode, done.stdout) == (2, "")
     assert done.stderr.startswith("blysk: fpga: ")

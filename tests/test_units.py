@@ -1,10 +1,10 @@
 # amaranth: UnusedElaboratable=no
-"""Every unit, by its record: RTL equal to the bit-accurate model under stalls, pauses and resets.
+"""Every unit, by its record: RTL equals the bit-accurate model under stalls, pauses and resets.
 
-The quick run has all stimuli of the default variants and of the default design, but those of `SELDOM` and
-`SELDOM_STIMULI`, compiled: the engine itself compares the first beats with Amaranth's simulator. CI has every
-default variant. The long run has all variants, whose models are compared so, too. Under stalls other
-simulators have the units in `tests/simulators`.
+The quick run has all stimuli of the default variants and of the default design, compiled, without `SELDOM`
+and `SELDOM_STIMULI`. The engine itself compares the first beats with Amaranth's simulator. CI has every
+default variant. The long run has all variants, and compares their first beats in the same way.
+`tests/simulators` runs the units under stalls in other simulators.
 """
 
 import inspect
@@ -24,7 +24,7 @@ from .decided import digest_of
 from .lists import OF_DOCUMENTS
 
 FEW = 24
-"""Beats in Amaranth's simulator; spans are as short as for 200 pixels."""
+"""Beats in Amaranth's simulator. Spans are as short as for 200 pixels."""
 
 
 SELDOM = (
@@ -40,16 +40,16 @@ SELDOM = (
     *("vector_adapter", "halfway_vector", "mirror_adapter", "light_adapter", "coarse_depth", "depth_tester"),
     *("motion", "draw_commands", "mesh_memory", "vertex_unit", "triangle_assembly", "tmds_encoder"),
 )
-"""Units that the default design does not have: of other methods and models, of renderer, buses and boards.
+"""Units that the default design does not have: other methods and models, renderer, buses and boards.
 
 Of geometry the quick run has the whole, and not its parts.
 """
 
 OF_NORMALS = ("pipeline", "renormalise, blinn")
-"""It gets the stimuli of unit normals, which the default design does not take."""
+"""This unit gets the stimuli of unit normals, which the default design does not take."""
 
 SELDOM_STIMULI = ("ties", "terminator", "drawn", "dense", "large", "largest")
-"""Stimuli that take the longest: integers of any size, many spans, many or large triangles."""
+"""Stimuli that take longest: integers of any size, many spans, many or large triangles."""
 
 
 CI = [pytest.mark.long, pytest.mark.ci]
@@ -71,7 +71,10 @@ def other_of(name, variant):
 
 
 def unit_of(name, variant):
-    """A component, the same for all its stimuli: it is translated once. Models of no others take memory."""
+    """A component, which all its stimuli share, so that it is translated once.
+
+    Models of other components are dropped from memory.
+    """
     return default_of(name) if variant == RECORDS[name].default else other_of(name, variant)
 
 
@@ -82,7 +85,8 @@ def _runs():
             for stimulus, sent in stimuli.items():
                 usual = variant == record.default or (name, variant) == OF_NORMALS
                 usual = usual and not (given.long or sent.long)
-                # The default variant gets every stimulus, the others the first and those that name them.
+                # The default variant gets every stimulus. Other variants get the first stimulus, and those
+                # that name them.
                 if variant == record.default or stimulus == next(iter(stimuli)) or variant in sent.variants:
                     yield pytest.param(
                         name,
@@ -94,21 +98,21 @@ def _runs():
 
 
 netlist_of = lru_cache(maxsize=2)(cxxrtl.netlist_of)
-"""Text of a unit. Each is kept beside that of the component that counts its flags."""
+"""Text of a unit. It is kept beside the text of the component that counts its flags."""
 
 
 @pytest.fixture(scope="module", autouse=True)
 def one_netlist():
-    """The engine compiles the text that has the digest: a unit is translated once."""
+    """Let the engine compile the text that has the digest, so that a unit is translated once."""
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(cxxrtl, "netlist_of", netlist_of)
         yield
 
 
 def digest_of_runs(unit, pace, runs):
-    """Digest of all that `test_equals_model` asserts of a unit."""
+    """Digest of all that `test_equals_model` checks of a unit."""
     times = [getattr(unit, name, None) for name in ("latency", "initiation_interval", "skid")]
-    # A latency that depends on the beat is a method. The run does not assert it.
+    # If a latency depends on the beat, it is a method. The run does not check it.
     times = [None if callable(time) else time for time in times]
     said = [
         (run.case.beats, run.case.sent, run.expected, run.status, run.stalls, run.settles) for run in runs
@@ -118,9 +122,10 @@ def digest_of_runs(unit, pace, runs):
 
 @pytest.mark.parametrize(("name", "variant", "stimulus"), list(_runs()))
 def test_equals_model(name, variant, stimulus, decided, request):
-    """Beat by beat, where the unit states them cycle by cycle, under stalls; at its rate after them.
+    """Beats equal the model's under stalls, cycle by cycle if the unit states cycles, and keep their rate
+    afterwards.
 
-    Structures that CI leaves out are run again when they, or what is sent or expected, change.
+    Structures that CI leaves out are run again if they, their input or their expected output change.
     """
     unit, free = unit_of(name, variant), None
     pace = RECORDS[name].stimuli[stimulus].pace
@@ -150,7 +155,10 @@ def few_of(record, variant, unit):
 
 
 def _resets():
-    """Parts share what is reset with the pipeline, pipelined units with one of them: CI has the others."""
+    """Parts share their resets with the pipeline, and pipelined units with each other.
+
+    CI has the other units.
+    """
     for name, record in RECORDS.items():
         if not record.remembers:
             yield pytest.param(name, marks=[] if name in ("chord", "pipeline") else CI)
@@ -158,7 +166,7 @@ def _resets():
 
 @pytest.mark.parametrize("name", list(_resets()))
 def test_reset_leaves_nothing_behind(name):
-    """Reset with beats inside: the unit then answers as from power-up, on the same cycles."""
+    """After a reset with beats inside the unit answers as after power-up, in the same cycles."""
     record = RECORDS[name]
     unit = unit_of(name, record.default)
     case, count = few_of(record, record.default, unit), 6
@@ -178,7 +186,7 @@ def test_reset_leaves_nothing_behind(name):
 
 @pytest.mark.parametrize("name", RECORDS)
 def test_record_is_whole(name):
-    """Every stimulus says what it covers, every measured variant over which domain."""
+    """Every stimulus says what it covers, and every measured variant names its domain."""
     record = RECORDS[name]
     assert all(stimulus.covers for stimulus in record.stimuli.values())
     assert name in record.kind.__module__

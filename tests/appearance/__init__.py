@@ -1,1 +1,1 @@
-"""Small glTF files as the world has them, drawn by this project and by VTK."""
+"""Small glTF files with features of real files, drawn by this project and by VTK."""

@@ -1,14 +1,14 @@
 """Pictures of files by VTK, whose reader and renderer share no code with the project.
 
 VTK's importer reads meshes, nodes, colours, texture coordinates and images. Its materials are approximate. It
-has a wrap mode for both axes, none that mirrors, and no reversed winding under nodes that mirror. So each
-actor is drawn without VTK's material, as glTF and OpenGL define colour and winding. The shader discards
-fragments whose alpha is under a cutoff. The other fragments are opaque.
+has one wrap mode for both axes and no mirrored wrap. It does not reverse the winding under nodes that mirror.
+So each actor is drawn without VTK's material, with colour and winding as glTF and OpenGL define them.
 
-Of a file of another format VTK draws what the sample says that the file shows.
+The shader discards fragments whose alpha is under a cutoff. The other fragments are opaque. For a file of
+another format VTK draws what the sample says that the file shows.
 
-VTK decodes texels from sRGB only where a texture has `UseSRGBColorSpace`. OpenGL then decodes them before it
-filters. Products are linear light. VTK's frame buffer does not encode: the last lines of the shader do.
+VTK decodes texels from sRGB only if a texture has `UseSRGBColorSpace`. OpenGL then decodes them before it
+filters. Products are linear light. VTK's frame buffer does not encode, so the last lines of the shader do.
 """
 
 import os
@@ -145,7 +145,10 @@ def _actor(shape):
 
 
 def _plain(actor, sampler, cutoff):
-    """Take VTK's material from an actor, and keep its colour and texture; the texture, or None."""
+    """Remove VTK's material from an actor, and keep its colour and texture.
+
+    The result is the texture, or None.
+    """
     from vtkmodules.vtkFiltersCore import vtkReverseSense
 
     surface = actor.GetProperty()
@@ -158,10 +161,10 @@ def _plain(actor, sampler, cutoff):
         turned.SetInputData(actor.GetMapper().GetInput())
         turned.ReverseCellsOn()
         actor.GetMapper().SetInputConnection(turned.GetOutputPort())
-    # After the texture, which multiplies light.
+    # These lines come after the texture, which multiplies light.
     code = CUT % cutoff + ENCODE
     actor.GetShaderProperty().AddFragmentShaderReplacement("//VTK::DepthPeeling::Impl", True, code, False)
-    # Else VTK draws an actor with alpha after all others, and does not test its depth.
+    # Otherwise VTK draws an actor with alpha after all others, and does not test its depth.
     actor.ForceTranslucentOff()
     actor.ForceOpaqueOn()
     if texture is not None:
@@ -173,17 +176,17 @@ def _plain(actor, sampler, cutoff):
 
 
 def _wrap(texture, sampler):
-    """Wrap modes of both axes, of which `vtkTexture` itself has one."""
+    """Set the wrap modes of both axes; `vtkTexture` itself has only one."""
     wraps = {10497: "Repeat", 33648: "MirroredRepeat", 33071: "ClampToEdge"}
     made = texture.GetTextureObject()
-    # Else Mesa takes more samples, also of a magnified texture with levels.
+    # Otherwise Mesa takes more samples, also of a magnified texture with levels.
     made.SetMaximumAnisotropicFiltering(1)
     for key, put in (("wrapS", made.SetWrapS), ("wrapT", made.SetWrapT)):
         put(getattr(made, wraps[sampler.get(key, 10497)]))
 
 
 def _shine(actor, scene):
-    """Coefficients of a scene's one material under one distant light."""
+    """Set the coefficients of a scene's only material under one distant light."""
     material, (light,) = scene.materials[0], scene.lights
     reflection = material.reflection(distant_cosine(light, scene.camera.viewer))
     assert max(material.ambient + material.diffuse + tuple(reflection)) <= 1, "VTK limits colours"

@@ -1,8 +1,9 @@
-"""Files as the world has them, made by code: a name, the file, and how to look.
+"""Files with features of real files, made by code: a name, the file, and the options to look at it.
 
-The names of glTF files are those of Khronos' samples whose features they have. No file of the samples is
-copied. Of files of other formats the sample says what they show. Coordinates are under 1, and the largest is
-over 1/2. Then a scene has the same unit as its file.
+A glTF file has the name of the Khronos sample whose features it has. No file of the samples is copied. For
+files of other formats the sample says what they show.
+
+Coordinates are under 1, and the largest is over 1/2. Then a scene has the same unit as its file.
 """
 
 import io
@@ -30,7 +31,7 @@ BOX_FACES = [
 
 
 class File:
-    """A document that grows, and its one buffer."""
+    """A document that grows, with one buffer."""
 
     def __init__(self):
         self.buffer = b""
@@ -39,7 +40,7 @@ class File:
         self.document |= {"asset": {"version": "2.0"}, "scene": 0, "scenes": [{"nodes": []}]}
 
     def view(self, data, **more):
-        """Bytes; the number of their view."""
+        """Add bytes; the number of their view."""
         self.document["bufferViews"].append(
             {"buffer": 0, "byteOffset": len(self.buffer), "byteLength": len(data), **more}
         )
@@ -47,7 +48,10 @@ class File:
         return len(self.document["bufferViews"]) - 1
 
     def array(self, values, kind="f4"):
-        """Vectors, whole numbers normalised, each in whole words; the number of their accessor."""
+        """Add vectors, each in whole words; whole numbers are normalised.
+
+        The result is the number of their accessor.
+        """
         values = np.asarray(values, "<" + kind)
         rows = [row.tobytes() + bytes(-row.nbytes % 4) for row in values]
         accessor = {
@@ -62,14 +66,14 @@ class File:
         return len(self.document["accessors"]) - 1
 
     def corners(self, faces):
-        """Indices; the number of their accessor."""
+        """Add indices; the number of their accessor."""
         data = np.asarray(faces, "<u2").reshape(-1)
         accessor = {"bufferView": self.view(data.tobytes()), "componentType": 5123}
         self.document["accessors"].append({**accessor, "count": len(data), "type": "SCALAR"})
         return len(self.document["accessors"]) - 1
 
     def material(self, image=None, sampler=None, info=None, unlit=True, kind="PNG", **factors):
-        """A material, perhaps with a texture of an image of a kind; its number."""
+        """Add a material, perhaps with a texture of an image of some kind; its number."""
         if image is not None:
             view = self.view(picture(image, kind))
             self.document["images"].append({"bufferView": view, "mimeType": f"image/{kind.lower()}"})
@@ -85,14 +89,14 @@ class File:
         return len(self.document["materials"]) - 1
 
     def part(self, material, attributes, faces, mode=4, **node):
-        """A mesh of one part, and its node. Attributes are accessors."""
+        """Add a mesh of one part, and its node. Attributes are accessors."""
         primitive = {"attributes": attributes, "indices": self.corners(faces), "material": material}
         self.document["meshes"].append({"primitives": [{**primitive, "mode": mode}]})
         self.document["nodes"].append({"mesh": len(self.document["meshes"]) - 1, **node})
         self.document["scenes"][0]["nodes"].append(len(self.document["nodes"]) - 1)
 
     def square(self, material, places=PLACES, kind="f4", name="TEXCOORD_0", **node):
-        """A square with texture coordinates."""
+        """Add a square with texture coordinates."""
         attributes = {"POSITION": self.array(SQUARE), name: self.array(places, kind)}
         self.part(material, attributes, [0, 1, 2, 0, 2, 3], **node)
 
@@ -115,7 +119,7 @@ class File:
     def for_vtk(self, folder):
         """Write the file without unlit materials and alpha modes, which `drawn` sets; its path.
 
-        VTK's importer changes colours without light, in some of its versions.
+        In some of its versions VTK's importer changes colours without light.
         """
         for material in self.document["materials"]:
             for name in ("extensions", "alphaMode", "alphaCutoff"):
@@ -124,21 +128,21 @@ class File:
 
 
 class Shape(NamedTuple):
-    """What a file shows, without light."""
+    """The surface that a file shows, without light."""
 
     vertices: Any
     faces: Any
     colors: Any = None
     """Linear light of the vertices."""
     image: Any = None
-    """Codes, and then the texture coordinates of the vertices, v up."""
+    """Codes of the image, and the texture coordinates of the vertices, v up."""
     places: Any = None
     color: tuple = (1, 1, 1)
     """Linear light of the surface, which the image multiplies."""
 
 
 class Known(NamedTuple):
-    """A file of another format with its companions, by their names, and what it shows."""
+    """A file of another format with its companions by name, and the surface that it shows."""
 
     files: dict
     shape: Shape
@@ -150,12 +154,12 @@ class Known(NamedTuple):
         return folder / next(iter(self.files))
 
     def for_vtk(self, folder):
-        """What VTK draws."""
+        """The surface that VTK draws."""
         return self.shape
 
 
 def picture(image, kind="PNG"):
-    """Bytes of an image of a kind."""
+    """Bytes of an image in some format."""
     data = io.BytesIO()
     Image.fromarray(np.asarray(image, np.uint8)).save(data, kind)
     return data.getvalue()
@@ -173,9 +177,9 @@ def noise(width=4, height=4, seed=1):
 
 
 def vertex_colors(kind, channels):
-    """A box with colours of its corners: BoxVertexColors.
+    """A box with colours at its corners: BoxVertexColors.
 
-    VTK keeps 8 bits of linear light. So dark colours are its codes, and colours over 0.3 are any.
+    VTK keeps 8 bits of linear light. So dark colours are codes of VTK, and colours over 0.3 are random.
     """
     file = File()
     whole = {"f4": 1, "u1": 255, "u2": 65535}[kind]
@@ -188,7 +192,7 @@ def vertex_colors(kind, channels):
 
 
 def texture_coordinates(kind):
-    """Four corners of other colours, and a mark beside the upper left corner: TextureCoordinateTest."""
+    """Four corners of different colours, and a mark beside the upper left corner: TextureCoordinateTest."""
     image = np.full((8, 8, 3), 40)
     image[:4, :4], image[:4, 4:], image[4:, :4], image[4:, 4:] = (
         [255] * 3,
@@ -220,7 +224,8 @@ def linear_interpolation():
 
 
 def negative_scale(two_sided):
-    """Nodes that mirror, from in front and from behind, with back faces or without: NegativeScaleTest."""
+    """Nodes that mirror, seen from in front and from behind, with back faces or without:
+    NegativeScaleTest."""
     file = File()
     material = file.material(noise(2, 2), NEAREST)
     file.document["materials"][material]["doubleSided"] = two_sided
@@ -305,8 +310,8 @@ def primitive_modes():
 def plate(specular=None, node=None, **factors):
     """A bent plate with normals and a texture, with light: MetalRoughSpheres.
 
-    In VTK a texture multiplies highlights, too, as ours of metals does. So another plate has none. VTK gives
-    normals unit length only in pixels. So a node scales all axes equally.
+    In VTK a texture also multiplies highlights, as in our project for metals. So the other plate has no
+    highlight. VTK gives normals unit length only in pixels, so a node scales all axes equally.
     """
     file = File()
     u, v = np.meshgrid(np.linspace(0, 1, 9), np.linspace(0, 1, 9), indexing="ij")
@@ -324,7 +329,7 @@ def plate(specular=None, node=None, **factors):
 
 
 def minified(step):
-    """So many texels a pixel, a power of two: a level of the image's pyramid."""
+    """A power of two of texels to a pixel: a level of the image."""
     sampler, file = {"magFilter": 9729, "minFilter": 9985}, File()
     # Nine tenths of the picture's 96 lines show the square.
     file.square(file.material(noise(64, 64), sampler), PLACES * step * 0.9 * 96 / 64)
@@ -357,7 +362,8 @@ def holes(
 ):
     """A sheet with holes, a plate behind it, and the background beside the plate: AlphaBlendModeTest.
 
-    Alpha is that of an image, of the corners, and of the material. Without a cutoff it is 1/2.
+    Alpha is the product of the image's, the corners' and the material's alpha. If no cutoff is given, it is
+    1/2.
     """
     file = File()
     image = np.dstack([noise(*np.shape(alpha)[::-1], seed=2), alpha]) if alpha is not None else None
@@ -381,9 +387,12 @@ def holes(
 
 
 def reduced_holes():
-    """An image of 2 x 2 texels a pixel, of which 3 or 1 have an alpha of 1. So its level has 3/4 or 1/4."""
+    """An image of 2 x 2 texels to a pixel.
+
+    In each group 3 texels, or 1, have an alpha of 1. So its level has 3/4 or 1/4.
+    """
     dense = np.random.default_rng(6).random((16, 16)) < 0.6
-    # Of each 2 x 2 texels the upper left is opaque, and two more where it is dense.
+    # Of each 2 x 2 texels the upper left is opaque, and two more where the image is dense.
     shown = np.kron(dense, np.ones((4, 4)))
     shown[::2, ::2] = 1
     shown[1::2, 1::2] = 0
@@ -398,13 +407,13 @@ WHITE = {"ambient": 1, "diffuse": 1, "specular": 0, "lights": []}
 
 
 def codes_of(count, whole=255):
-    """Codes of sRGB. VTK keeps 8 bits of linear light. So dark codes are 0."""
+    """Codes of sRGB. VTK keeps 8 bits of linear light, so dark codes are 0."""
     codes = np.random.default_rng(8).integers(0, whole + 1, (count, 3))
     return np.where(codes < 0.6 * whole, 0, codes)
 
 
 def obj_colors(whole):
-    """Colours behind positions, to 1 or to 255."""
+    """Colours behind positions, from 0 to 1 or from 0 to 255."""
     codes = codes_of(8)
     rows = np.column_stack([BOX, codes if whole == 255 else codes / 255]).tolist()
     text = "".join(f"v {' '.join(map(repr, row))}\n" for row in rows)
@@ -413,7 +422,7 @@ def obj_colors(whole):
 
 
 def obj_image():
-    """An image of a material, scaled and moved, with other coordinates for each corner of both triangles."""
+    """An image of a material, scaled and moved. Each corner of both triangles has its own coordinates."""
     image, scale, offset = noise(4, 8), np.array([1.5, -0.75]), np.array([0.25, 0.1])
     corners = SQUARE[[0, 1, 2, 0, 2, 3]]
     places = np.array([[0, 0], [1, 0.1], [0.9, 1], [0.4, 0.2], [1.2, 0.8], [0.3, 1.4]])
@@ -427,7 +436,7 @@ def obj_image():
 
 
 def ply_head(form, names, vertices, faces, comment=""):
-    """Head of a PLY file of vertices with more properties."""
+    """Head of a PLY file whose vertices have further properties."""
     lines = [f"format {form} 1.0", *([comment] if comment else []), f"element vertex {vertices}"]
     lines += [f"property float {name}" for name in "xyz"] + [f"property {name}" for name in names]
     lines += [f"element face {faces}", "property list uchar int vertex_indices", "end_header"]
@@ -461,7 +470,7 @@ def ply_image():
 
 
 def stl_colors(head):
-    """Colours of facets, 5 bits a channel: by VisCAM, or, with the colour of the solid, by Materialise."""
+    """Colours of facets with 5 bits a channel: by VisCAM, or by Materialise with the colour of the solid."""
     codes = codes_of(12, 31)
     colors = linear(codes, 31)
     red, green, blue = codes.T
@@ -551,4 +560,4 @@ SAMPLES = {
         },
     ),
 }
-"""Of each sample the function that makes it, and what it is given."""
+"""For each sample the function that makes it, and its arguments."""

@@ -1,4 +1,4 @@
-"""Pictures of files whose look is known, beside those of VTK: another reader and another renderer."""
+"""Pictures of files whose look is known, compared with those of VTK: another reader and another renderer."""
 
 from functools import cache
 from pathlib import Path
@@ -32,14 +32,14 @@ QUICK = (
 
 
 class Pictures(NamedTuple):
-    """A sample by both renderers, in codes of sRGB."""
+    """A sample drawn by both renderers, in codes of sRGB."""
 
     scene: Any
     mask: np.ndarray
     ours: np.ndarray
     theirs: np.ndarray
     sure: np.ndarray
-    """Pixels that stay where VTK's camera moves by 1/16 pixel: neither edges nor borders of texels."""
+    """Pixels that do not change when VTK's camera moves by 1/16 pixel: no edges and no borders of texels."""
 
 
 @cache
@@ -49,7 +49,7 @@ def pictures(name: str) -> Pictures:
     options = {key: look.pop(key) for key in OPTIONS if key in look}
     lit, cutoff = bool(options.get("lights")), look.pop("cutoff", 0.0)
     with TemporaryDirectory() as folder:
-        # A warning, of contents that are not read, would be an error.
+        # A warning about contents that are not read would be an error.
         scene = blysk.scene(file.write(Path(folder)), size=SIZE, **LOOK | options)
         seen = drawn(file.for_vtk(Path(folder)), scene, look, SHIFTS, lit, cutoff).astype(int)
     frame = render(scene, model=REFLECTION_MODELS["phong"])
@@ -85,7 +85,7 @@ def test_codes_of_greys_come_out_as_they_are():
     ["vertex colours, f4 x 3", "texture settings, 4", "texture transform", "factor times texture", "metal"],
 )
 def test_the_pipeline_draws_the_same_picture(name):
-    """The bit-accurate model, within 1 LSB of the exact frame, and so near VTK's picture."""
+    """The bit-accurate model is within 1 LSB of the exact frame, and so it is near VTK's picture."""
     pytest.importorskip("vtkmodules", reason="VTK is not installed")
     scene, mask, ours, theirs, sure = pictures(name)
     image = model_frame(scene, design_for(blysk.design(model="phong"), scene)).image

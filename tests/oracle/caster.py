@@ -1,8 +1,8 @@
-"""A small ray caster: own camera, own intersection, own formulas, from `docs/theory` alone.
+"""A small ray caster with its own camera, intersection and formulas, from `docs/theory` alone.
 
-It takes plain numbers and arrays and imports nothing of blysk. A ray goes through each pixel centre; of a
-triangle that it meets, the barycentric coordinates in space weight the normals of the corners, whose sum is
-normalised. That is what perspective-correct interpolation means, without a line of rasterisation. The same
+It takes plain numbers and arrays and imports nothing of blysk. A ray goes through each pixel centre. Where it
+meets a triangle, the barycentric coordinates in space weight the normals of the corners, and the sum is
+normalised. This is the meaning of perspective-correct interpolation, without rasterisation. The same
 coordinates weight colours and texture coordinates of the corners.
 """
 
@@ -18,7 +18,7 @@ MODELS = {
     "cosquad7": lambda c, n: np.maximum(1 - 7 * n / 16 * (1 - c), 0) ** 2,
     "cosquad_lin": lambda c, n: np.maximum(1 - (0.448 * n + 0.099) * (1 - c), 0) ** 2,
 }
-"""Reflection models by their formulas in docs/theory/models.md; c is N·H, of ``phong`` R·V."""
+"""Reflection models by their formulas in docs/theory/models.md; c is N·H, and R·V for ``phong``."""
 
 
 def unit(v):
@@ -29,7 +29,7 @@ def unit(v):
 
 @dataclass
 class View:
-    """Where the camera stands and what it sees; angles in degrees, pixels are square."""
+    """The position of the camera and its view. Angles are in degrees, and pixels are square."""
 
     position: tuple
     target: tuple
@@ -46,7 +46,7 @@ class View:
         self.up = np.cross(self.right, self.forward)
 
     def on_plane(self, x, y):
-        """Offset from the line of sight, at depth 1 or at any, of places in pixels from the upper left."""
+        """Offset from the line of sight, at depth 1 or any depth, of points in pixels from the upper left."""
         extent = 2 * np.tan(np.radians(self.field_of_view) / 2) if self.perspective else self.world_height
         size = extent / self.height
         across = (np.asarray(x) - self.width / 2) * size
@@ -54,14 +54,14 @@ class View:
         return across[..., None] * self.right + above[..., None] * self.up
 
     def rays(self, x, y):
-        """Origin and direction of the rays through places in pixels."""
+        """Origin and direction of the rays through points in pixels."""
         offset = self.on_plane(x, y)
         if self.perspective:
             return np.broadcast_to(self.position, offset.shape), offset + self.forward
         return self.position + offset, np.broadcast_to(self.forward, offset.shape)
 
     def places(self, points):
-        """Places in pixels and depths of points."""
+        """Positions in pixels, and depths, of points in space."""
         relative = points - np.asarray(self.position)
         depth = relative @ self.forward
         extent = 2 * np.tan(np.radians(self.field_of_view) / 2) if self.perspective else self.world_height
@@ -73,7 +73,7 @@ class View:
         )
 
     def snapped(self, points, steps):
-        """Points moved, at their depth, to the nearest of so many places a pixel."""
+        """Points moved, at their depth, to the nearest of some positions a pixel."""
         x, y, depth = self.places(points)
         x, y = (np.round(place * steps) / steps for place in (x, y))
         offset = self.on_plane(x, y) * (depth[..., None] if self.perspective else 1.0)
@@ -82,22 +82,22 @@ class View:
 
 @dataclass
 class Paint:
-    """Colours and texture coordinates of vertices, and an image; each may be missing."""
+    """Colours and texture coordinates of vertices, and an image. Each may be missing."""
 
     faces: np.ndarray
     colors: np.ndarray | None = None
     coordinates: np.ndarray | None = None
     image: np.ndarray | None = None
     wrap: tuple = ("wrap", "wrap")
-    """Of u and of v, in the words of `numpy.pad`: ``wrap``, ``symmetric``, ``edge``."""
+    """The wraps of u and of v, in the words of `numpy.pad`: ``wrap``, ``symmetric``, ``edge``."""
     order: int = 1
     """1: bilinear; 0: nearest."""
     alpha: np.ndarray | None = None
-    """Of vertices."""
+    """Alpha of vertices."""
     opacity: np.ndarray | None = None
     """Alpha of the image, of shape (height, width)."""
     cut: tuple = ()
-    """Triangles of which points are not seen where the product of both is under a half."""
+    """Triangles with holes: a point is not seen if the product of both alphas is under 1/2."""
 
     def at(self, index, weights):
         """Albedo at points of a triangle, from barycentric coordinates of shape (..., 3)."""
@@ -118,9 +118,12 @@ class Paint:
         return alpha >= 0.5
 
     def texel(self, image, place):
-        """Channels of an image, continued as far as the places of shape (..., 2) go."""
+        """Channels of an image at points of shape (..., 2).
+
+        The image is continued as far as the points go.
+        """
         size = np.array(image.shape[1::-1])
-        # Centres of texels at whole numbers.
+        # Centres of texels are at whole numbers.
         x, y = np.moveaxis(place * size - 0.5, -1, 0)
         margin = 2 + int(np.ceil(max(-x.min(), -y.min(), x.max() - size[0], y.max() - size[1], 0)))
         whole = np.pad(image, ((0, 0), (margin, margin), (0, 0)), self.wrap[0])
@@ -132,23 +135,24 @@ class Paint:
 
 @dataclass
 class Picture:
-    """What the caster sees at every pixel; arrays of the picture's size."""
+    """The surface that the caster sees at every pixel; arrays of the picture's size."""
 
     color: np.ndarray
     cosine: np.ndarray
     hit: np.ndarray
     margin: np.ndarray
-    """The lesser of the least barycentric coordinate and the relative distance to the next surface behind."""
+    """The smaller of two numbers: the least barycentric coordinate, and the relative distance to the next
+    surface behind."""
 
 
 def meet(view, corners, x, y):
-    """Barycentric coordinates of shape (..., 3) and ray lengths, where rays through pixels meet a plane."""
+    """Barycentric coordinates of shape (..., 3) and ray lengths where rays through pixels meet a plane."""
     origin, ray = view.rays(x, y)
-    # Moeller and Trumbore: origin + t ray = (1 - u - v) a + u b + v c.
+    # By Moeller and Trumbore: origin + t ray = (1 - u - v) a + u b + v c.
     a, ab, ac = corners[0], corners[1] - corners[0], corners[2] - corners[0]
     p, s = np.cross(ray, ac), origin - a
     q, volume = np.cross(s, ab), p @ ab
-    # A ray along the triangle's plane meets it nowhere.
+    # A ray along the triangle's plane does not meet it.
     volume = np.where(volume == 0, np.nan, volume)
     u, v, t = (s * p).sum(axis=-1) / volume, (ray * q).sum(axis=-1) / volume, q @ ac / volume
     return np.stack([1 - u - v, u, v], axis=-1), t
@@ -170,12 +174,12 @@ def cast(
     tinted=False,
     emission=(0.0, 0.0, 0.0),
 ):
-    """Colours 0 to 255, not rounded, of one directional white light.
+    """Colours 0 to 255, not rounded, under one directional white light.
 
-    ``coefficients`` are k_a, k_d and k_s, each of three channels; with ``steps``, corners stand on a grid of
-    so many places a pixel. Normals are turned where the triangle is seen from behind; triangles of the
-    indices ``one_sided`` are then not seen. With ``f0``, k_s is of Fresnel's reflection, by Schlick. A
-    ``paint`` gives the surface an albedo, which a ``tinted`` highlight takes, too.
+    ``coefficients`` are k_a, k_d and k_s, each of three channels. With ``steps``, corners are on a grid of so
+    many positions a pixel. If a triangle is seen from behind, its normals are turned. Triangles of the
+    indices ``one_sided`` are then not seen. With ``f0``, k_s is that of Fresnel's reflection by Schlick. A
+    ``paint`` gives the surface an albedo. It also multiplies a ``tinted`` highlight.
     """
     shape = (view.height, view.width)
     depth, second = np.full(shape, np.inf), np.full(shape, np.inf)

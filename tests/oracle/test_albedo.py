@@ -18,11 +18,11 @@ from .test_frames import COEFFICIENTS, LIGHT, MESHES, SURE, camera_of, view_of
 
 SIZE = 96, 72
 WORDS = {"repeat": "wrap", "mirror": "symmetric", "clamp": "edge"}
-"""Words of `numpy.pad` for ours."""
+"""The words of `numpy.pad` for our words."""
 
 
 def floor() -> Mesh:
-    """Two triangles that go under the camera and far away."""
+    """Two triangles that go from under the camera far away."""
     points = np.array([[-4.0, 0, 4], [4, 0, 4], [4, 0, -30], [-4, 0, -30]])
     return Mesh(points, np.array([[0, 1, 2], [0, 2, 3]]), np.tile([0.0, 1, 0], (4, 1)))
 
@@ -94,7 +94,7 @@ def test_albedo(name, projection, look):
     scene = scene_of(name, projection, image, colors, **looks)
     seen = casted(scene, None if image is None else image.texels)
     assert errors(scene, seen).max() < 1e-7
-    # The albedo is what makes this picture.
+    # The picture comes from the albedo.
     plain = replace(
         scene, mesh=replace(scene.mesh, colors=np.zeros((0, 3))), material=Material(*COEFFICIENTS, 20)
     )
@@ -102,7 +102,7 @@ def test_albedo(name, projection, look):
 
 
 def steps_of(scene: Scene, raster) -> np.ndarray:
-    """Largest texel step of each span, from coordinates a little around both ends."""
+    """Largest texel step of each span, from coordinates close to both ends."""
     view, mesh, found = view_of(scene), scene.mesh, np.zeros(len(raster.length))
     size = np.array(scene.material.texture.texels.shape[1::-1])
     h = 1e-3
@@ -131,7 +131,7 @@ def steps_of(scene: Scene, raster) -> np.ndarray:
     ],
 )
 def test_levels(name, projection, side):
-    """Levels of spans by numeric derivatives, and a picture by them."""
+    """Levels of spans are compared with numeric derivatives, and a picture with levels found in this way."""
     image = np.random.default_rng(8).random((side, side, 3))
     scene = scene_of(name, projection, Texture(image, ("mirror", "repeat")))
     raster = rasterise(scene)
@@ -172,14 +172,15 @@ def test_near_plane():
     pixel = raster.pixel[which]
     assert len(which) > 0.5 * SIZE[0] * SIZE[1]
     found = np.abs(255 * render(scene).image - seen.color).reshape(-1, 3)[pixel]
-    # The ray caster does not round the corners of a cut to 1/256 pixel, a shift of half of that.
+    # The ray caster does not round the corners of a cut to 1/256 pixel. This shifts them by half of it.
     assert (found.max(axis=1) < 255 * steps[raster.span[which]] / 512).all()
 
 
 @pytest.mark.parametrize("projection", ["perspective", "orthographic"])
 @pytest.mark.parametrize("filter", ["nearest", "bilinear", "none"])
 def test_cutoff(projection, filter):
-    """A plate with holes before a whole plate of other colours: holes show the plate behind."""
+    """A plate with holes stands in front of a whole plate of other colours, and the holes show the plate
+    behind."""
     rng = np.random.default_rng(9)
     plate = np.array([[-1.0, -1, 0], [1, -1, 0.4], [1, 1, 0], [-1, 1, -0.3]])
     points = np.concatenate([plate, 0.9 * plate - (0, 0, 0.8)])
@@ -205,7 +206,7 @@ def test_cutoff(projection, filter):
     raster = rasterise(scene)
     whole = rasterise(replace(scene, material=(replace(material, cutoff=None),) * 2))
     front = raster.visible & (raster.triangle[raster.span] < 2)
-    # The plate in front hides nothing of itself.
+    # The plate in front hides no part of itself.
     covered = int((whole.triangle[whole.span] < 2).sum())
     assert raster.dropped == covered - front.sum()
     assert 0.2 < raster.dropped / covered < 0.8

@@ -17,7 +17,10 @@ AMBIENT = 0.75
 
 
 def ball():
-    """A ball of 80 triangles whose vertices have any codes of sRGB. Coordinates are under 1, and over 1/2."""
+    """A ball of 80 triangles whose vertices have random codes of sRGB.
+
+    Coordinates are under 1, and the largest is over 1/2.
+    """
     made = trimesh.creation.icosphere(1, 0.75)
     codes = np.random.default_rng(3).integers(0, 256, (len(made.vertices), 4))
     codes[:, 3] = 255
@@ -26,7 +29,8 @@ def ball():
 
 
 def by_trimesh(path, **options):
-    """A file that trimesh writes, and what it reads of it: vertices, faces, codes of vertices."""
+    """A file that trimesh writes, and the data that trimesh reads from it: vertices, faces, codes of
+    vertices."""
     ball().export(path, **options)
     read = trimesh.load(path, process=False)
     return read.vertices, read.faces, read.visual.vertex_colors[:, :3] / 255
@@ -68,6 +72,6 @@ def test_colours_of_files(tmp_path, name, write, options, projection):
     frame = render(scene)
     sure = seen.hit & (seen.margin > SURE)
     assert sure.sum() > 0.9 * frame.mask.sum() > 1000
-    # Of texts trimesh keeps numbers of single precision.
+    # From texts trimesh keeps numbers of single precision.
     assert np.abs(255 * frame.image - seen.color)[sure].max() < 1e-4
     assert np.ptp(seen.color[sure], axis=0).min() > 100

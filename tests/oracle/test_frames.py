@@ -23,11 +23,11 @@ SIZE = 384, 288
 LIGHT = -0.5, 0.8, 0.7
 COEFFICIENTS = (0.05,) * 3, (0.4, 0.3, 0.2), (0.55, 0.5, 0.6)
 SURE = 1e-4
-"""Margin from which on the triangle that a pixel shows is not in doubt."""
+"""Margin from which on it is certain which triangle a pixel shows."""
 
 
 def torus(around: int, across: int) -> Mesh:
-    """A torus of so many sides."""
+    """A torus with some numbers of sides."""
     u, v = np.meshgrid(*(np.arange(n) * 2 * np.pi / n for n in (around, across)), indexing="ij")
     normal = np.stack([np.cos(u) * np.cos(v), np.sin(v), np.sin(u) * np.cos(v)], axis=-1)
     points = np.stack([np.cos(u), 0 * u, np.sin(u)], axis=-1) + 0.45 * normal
@@ -42,13 +42,13 @@ def torus(around: int, across: int) -> Mesh:
 
 
 def triangle() -> Mesh:
-    """One that starts close to the camera and goes far away, with normals 100 degrees apart."""
+    """A triangle that starts close to the camera and goes far away, with normals 100 degrees apart."""
     points = np.array([[-1.0, -1.0, 0.9], [1.0, -1.0, -6.0], [0.0, 1.2, 0.0]])
     return Mesh(points, np.array([[0, 1, 2]]), unit([[-0.7, -0.3, 0.6], [0.8, 0.1, 0.7], [0.1, 0.8, 0.4]]))
 
 
 def needle() -> Mesh:
-    """A sliver across the picture, its normals 60 degrees apart."""
+    """A sliver across the picture, with normals 60 degrees apart."""
     points = np.array([[-1.2, -0.40, 0.5], [1.3, 0.35, -2.0], [-1.2, -0.38, 0.5]])
     return Mesh(points, np.array([[0, 1, 2]]), unit([[-0.5, 0.1, 0.8], [0.6, 0.3, 0.7], [-0.5, 0.4, 0.8]]))
 
@@ -63,7 +63,7 @@ MESHES = {
 
 
 def camera_of(name: str, projection: str) -> Camera:
-    """A camera that shows all of a mesh; of the single triangles one that stands close to them."""
+    """A camera that shows all of a mesh. For single triangles it stands close to them."""
     if len(MESHES[name].faces) > 1:
         return Camera.framing(MESHES[name].vertices, (0.4, 0.5, 1.0), projection, SIZE[0] / SIZE[1], 30.0)
     return Camera((0.1, 0.2, 2.2), (0.0, 0.0, 0.0), projection=projection, height=2.4, field_of_view=70.0)
@@ -78,7 +78,7 @@ def view_of(scene: Scene) -> View:
 
 
 def held(scene: Scene, design, light=LIGHT, **options) -> tuple[np.ndarray, float]:
-    """Errors at the pixels that are not in doubt, in LSB; and the project's own method error."""
+    """Errors at the pixels that are not in doubt, in LSB, and the project's own method error."""
     mesh = scene.mesh
     seen = cast(
         mesh.vertices,
@@ -97,19 +97,19 @@ def held(scene: Scene, design, light=LIGHT, **options) -> tuple[np.ndarray, floa
     sure = seen.hit & (seen.margin > SURE) & (np.abs(seen.cosine) > 0.002)
     assert np.count_nonzero(sure) > 0.9 * np.count_nonzero(shown) - 400
     assert shown[sure].all()
-    # A pixel that only one of the two shows lies on an edge.
+    # A pixel that only one of both pictures shows lies on an edge.
     assert np.count_nonzero(shown != seen.hit) <= 0.002 * shown.size
     return np.abs(frame.image[sure] - seen.color[sure]), compare(scene, design, frame).method_error.max_lsb
 
 
 def scene_of(mesh: Mesh, camera: Camera, exponent: int) -> Scene:
-    """One white light from above on the left."""
+    """The light is one white light from above on the left."""
     material = Material(*COEFFICIENTS, exponent)
     return Scene(mesh, camera, *SIZE, material, (Light(LIGHT),))
 
 
 def words_bound(design, exponent: int) -> float:
-    """Bound of the error in LSB from the words of a method's normals, rounding and cut of spans included."""
+    """Bound of the error in LSB from the words of a method's normals, with rounding and the cut of spans."""
     method = design.interpolator
     error = method.operand_error(SIZE[0], method.MAX_ANGLE)
     highlight = method.highlight_error(design.specular, exponent, SIZE[0], error)
@@ -146,7 +146,7 @@ def test_frame(method, name, projection, exponent):
     design = preset(method, "cosquad")
     errors, own = held(scene, design)
     assert errors.max() <= max(1.0, words_bound(design, exponent) if method == "quadratic" else 0)
-    # What the project says of itself is what the caster finds, but for pixels in doubt.
+    # The project's own figures are those that the caster finds, except for pixels in doubt.
     assert errors.max() <= own + 0.05
 
 
@@ -174,7 +174,7 @@ QUOTIENTS = sorted({*frames_of("blinn", "phong"), *SHORT_QUOTIENTS})
     ],
 )
 def test_quotient(model, name, projection, exponent):
-    """Blinn's highlight by N·H, and Phong's by the vector R itself."""
+    """Blinn's highlight is computed by N·H, and Phong's by the vector R itself."""
     scene = scene_of(MESHES[name], camera_of(name, projection), exponent)
     errors, own = held(scene, preset("quotient", model))
     assert errors.max() <= 0.6
@@ -183,14 +183,17 @@ def test_quotient(model, name, projection, exponent):
 
 @pytest.mark.parametrize("exponent", [20, pytest.param(500, marks=pytest.mark.long)])
 def test_camera_inside(exponent):
-    """In the tube of a torus, at a wall that crosses the near plane."""
+    """The camera is in the tube of a torus, at a wall that crosses the near plane."""
     camera = Camera((1.0, 0.0, 0.05), (0.4, 0.1, 1.0), projection="perspective", field_of_view=80.0)
     errors, _ = held(scene_of(MESHES["coarse torus"], camera, exponent), preset("renormalise", "cosquad"))
     assert errors.max() <= 1.0
 
 
 def test_fresnel():
-    """A light from behind, at V·H = 0.3: there the reflection is over four times that along the normal."""
+    """A light comes from behind, at V·H = 0.3.
+
+    There the reflection is over four times as large as along the normal.
+    """
     mesh, f0 = MESHES["coarse torus"], (0.04, 0.2, 0.7)
     camera = camera_of("coarse torus", "orthographic")
     side = unit(np.cross(camera.viewer, (0.0, 1.0, 0.0)))
@@ -206,7 +209,7 @@ def test_fresnel():
 
 
 def test_two_sided():
-    """Half a torus, its back faces left out, but for those of one of two materials, which are turned."""
+    """Half a torus without its back faces. Those of one of two materials are turned instead."""
     mesh = MESHES["coarse torus"]
     middle = mesh.vertices[mesh.faces].mean(axis=1)
     faces = mesh.faces[middle[:, 2] < 0.1]
@@ -228,7 +231,7 @@ def test_two_sided():
 
 
 def test_caster_finds_a_wrong_curve():
-    """Ends joined without their magnitudes, as an earlier version did, are 10 LSB and more off."""
+    """Ends joined without their magnitudes, as in an earlier version, are off by 10 LSB and more."""
     scene = scene_of(MESHES["triangle"], camera_of("triangle", "perspective"), 50)
     wrong = shade_spans(
         scene, rasterise(scene), "normalised", preset("renormalise", "cosquad").specular.reflection

@@ -1,7 +1,7 @@
-"""The test that cocotb runs in a simulator: frames through a core on a bus, by public models of the buses.
+"""The test that cocotb runs in a simulator: frames through a core on a bus, with public models of the buses.
 
-``case.npz`` beside the simulation has what is sent and what is to come. Either side of every stream and
-channel pauses at random.
+``case.npz`` beside the simulation has the input and the expected output. Both sides of every stream and
+channel pause at random.
 """
 
 import itertools
@@ -94,7 +94,7 @@ class Wishbone:
 
 
 async def refusals(bus, case):
-    """What is refused is told so, and why."""
+    """Refused accesses are answered as refused, and the registers tell why."""
     assert await bus.read(0) == (OKAY, int.from_bytes(b"BLSK", "big"))
     errors, refused, scratch = (int(case[name]) for name in ("errors", "refused", "scratch"))
     assert await bus.read(errors) == (OKAY, 0)
@@ -108,7 +108,7 @@ async def refusals(bus, case):
     assert await bus.read(errors) == (OKAY, 0b11111)
     assert await bus.write(errors, 0b10101) == OKAY
     assert await bus.read(errors) == (OKAY, 0b01010)
-    # As drivers do: all ones, of which most are for bits that there are not.
+    # As drivers do: all ones, most of them for bits that do not exist.
     assert await bus.write(errors, 0xFFFFFFFF) == OKAY
     assert await bus.read(errors) == (OKAY, 0)
 
@@ -120,7 +120,7 @@ async def frames(dut):
     random.seed(int(case["seed"]))
     dut.clk.value, dut.rst.value = 0, 1
     await Timer(1, "ns")
-    # One cycle of reset, before which nothing is known and the models of the buses do not look.
+    # There is one cycle of reset. Before it nothing is defined, and the models of the buses do not look.
     cocotb.start_soon(Clock(dut.clk, 10, "ns").start())
     await RisingEdge(dut.clk)
     dut.rst.value = 0
@@ -143,7 +143,7 @@ async def frames(dut):
 
 
 async def draw(dut, case, source, sink, bus):
-    """All frames: what comes, its packets and marks; constants are locked meanwhile."""
+    """Draw all frames, and check the output, its packets and marks. Constants are locked meanwhile."""
     state, size = int(case["state"]), case["given"].shape[1]
     ends = np.flatnonzero(case["given_last"]) + 1
     for part in np.split(case["given"], ends[:-1]):

@@ -18,7 +18,8 @@ async def two_frames(dut):
     clocks = (dut.serial_clk, PIXEL // 5), (dut.pixel_clk, PIXEL), (dut.clk, int(os.environ["DVI_DRAW"]))
     for clock, period in clocks:
         Clock(clock, period, "ps").start()
-    # In the middle of the first pulse: the decoder takes the end of one for a frame's beginning.
+    # This is in the middle of the first pulse, because the decoder takes the end of a pulse for the beginning
+    # of a frame.
     await ClockCycles(dut.pixel_clk, int(os.environ["DVI_START"]))
     sink = DVISink(dut, DVIBus.from_prefix(dut, "tmds"), image_file=os.environ["DVI_IMAGE"])
     await sink.frame_finished(2)

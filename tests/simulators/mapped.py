@@ -1,4 +1,4 @@
-"""Mapped ECP5 netlists of components, as Verilog that simulators run and Yosys proves things of."""
+"""Mapped ECP5 netlists of components, as Verilog for simulators and for proofs by Yosys."""
 
 import json
 import re
@@ -17,18 +17,18 @@ from blysk.bench.tools.place_and_route import MAP_AFTER, MAP_BEFORE
 __all__ = ["cells", "connect", "core", "first", "map_component", "same", "swap", "verilog_of"]
 
 _YOSYS_CELLS = ("LUT2", "LUT4", "PFUMX", "L6MUX21", "TRELLIS_FF", "TRELLIS_DPR16X4", "CCU2C")
-"""Cells that Yosys has models of."""
+"""Cells for which Yosys has models."""
 
 
 def map_component(component: Component, folder: Path) -> dict[str, Any]:
-    """Yosys's JSON of a component by itself, mapped to ECP5 as `place_and_route` maps one."""
+    """Yosys's JSON of a component by itself, mapped to ECP5 as `place_and_route` maps it."""
     (folder / "top.il").write_text(rtlil.convert(component, name="top", emit_src=False))
     yosys(MAP_BEFORE + ECP5.synthesis + MAP_AFTER, folder)
     return json.loads((folder / "netlist.json").read_text())
 
 
 def verilog_of(netlist: dict[str, Any], folder: Path) -> str:
-    """Verilog of a netlist, cells as instances."""
+    """Verilog of a netlist, with cells as instances."""
     top = netlist["modules"]["top"]
     cells = {name: {**cell, "connections": _connected(cell)} for name, cell in top["cells"].items()}
     modules = {"top": {**top, "cells": cells}}
@@ -75,7 +75,7 @@ def connect(cell: dict[str, Any], pin: str, bit: str) -> None:
 
 
 def core(component: Component, text: str) -> str:
-    """Verilog of a module ``core``, for the bench, about the module ``top`` of a component."""
+    """Verilog of a module ``core`` for the bench, around the module ``top`` of a component."""
     ports = [("clk", 1, "input"), ("rst", 1, "input")]
     inner = ["clk", "rst"]
     for path, member, value in component.signature.flatten(component):
@@ -92,7 +92,7 @@ def core(component: Component, text: str) -> str:
     return f"module core ({listed});\n{declared}  top whole ({joined});\nendmodule\n{text}{cells()}"
 
 
-# Black boxes stand for what the step leaves alone.
+# Black boxes stand for the parts that the step does not change.
 _PROOF = """\
 read_json both.json
 read_verilog models.v
@@ -116,13 +116,15 @@ write_json proof.json
 
 
 def same(before: dict[str, Any], after: dict[str, Any], folder: Path) -> str:
-    """Whether two netlists do the same on every cycle; the reason why not, or nothing.
+    """Whether two netlists do the same in every cycle; the result is the reason why not, or empty.
 
-    Those cells of the netlist ``after`` that are new or changed, multipliers, memories and look-up tables,
-    are put beside the netlist ``before`` and read its nets; a memory as one without register, and it.
-    A carry that is gone must have no reader. Yosys then merges equal cells of equal inputs and equal
-    state at power-up. If each product of ``after`` is merged with the net of ``before`` that it drives in
-    ``after``, then the nets of ``before`` satisfy every equation of ``after``, and there is one solution.
+    Cells of the netlist ``after`` that are new or changed (multipliers, memories, look-up tables) are put
+    beside the netlist ``before`` and read its nets. A memory is put there as a memory without register, and
+    the register. A carry that was removed must have no reader.
+
+    Yosys then merges cells that have the same function, the same inputs and the same state at power-up. Each
+    product of ``after`` must be merged with the net of ``before`` that it drives in ``after``. Then the nets
+    of ``before`` satisfy every equation of ``after``, and these have only one solution.
     """
     old, new = before["modules"]["top"], after["modules"]["top"]
     if new["ports"] != old["ports"]:
@@ -182,7 +184,7 @@ def same(before: dict[str, Any], after: dict[str, Any], folder: Path) -> str:
 
 
 def _connected(cell: dict[str, Any]) -> dict[str, Any]:
-    """Ports of a cell, but outputs that drive nothing."""
+    """Ports of a cell, without outputs that drive nothing."""
     directions = cell["port_directions"]
     given = cell["connections"].items()
     return {port: bits for port, bits in given if directions[port] != "output" or bits != ["x"]}
@@ -194,7 +196,10 @@ def _without_carry(cell: dict[str, Any]) -> dict[str, Any]:
 
 
 def _take_registers_out(cells: dict[str, Any], name: str, before: dict[str, Any], fresh: int) -> int:
-    """Put the registers of a memory's words behind it, as cells of their own; the next net that is free."""
+    """Put the registers of a memory's words behind the memory, as separate cells.
+
+    The result is the next free net.
+    """
     cell = cells[name]
     connections, parameters = dict(cell["connections"]), dict(cell["parameters"])
     wide = int(str(parameters["DATA_WIDTH_B"]), 2) == 36
@@ -220,7 +225,7 @@ def _take_registers_out(cells: dict[str, Any], name: str, before: dict[str, Any]
             "port_directions": {pin: "output" if pin == "q" else "input" for pin in pins},
             "connections": pins,
         }
-        # What the port's own pins are without the register.
+        # The values of the port's own pins without the register.
         parameters[f"REGMODE_{port}"] = before["parameters"][f"REGMODE_{port}"]
         connections[f"OCE{port}"] = before["connections"][f"OCE{port}"]
     cells[name] = {**cell, "connections": connections, "parameters": parameters}

@@ -1,6 +1,6 @@
 """Cores on buses as Verilog, driven by public models of AXI and Wishbone, against the bit-accurate model.
 
-All begin with one cycle of reset; in Icarus Verilog registers and written memories are undefined before it.
+All begin with one cycle of reset. In Icarus Verilog registers and written memories are undefined before it.
 """
 
 import os
@@ -42,7 +42,7 @@ def register_writes(map, case):
 
 
 def case_of(unit, pipelined, seed=2026):
-    """What is sent, and what is to come, as arrays."""
+    """The input, and the expected output, as arrays."""
     framing, map = unit.framing, unit.map
     case = RECORD.stimuli["frames"].make(framing, np.random.default_rng(seed), 80)
     run = RECORD.expect(framing, case)
@@ -64,7 +64,7 @@ def case_of(unit, pipelined, seed=2026):
 
 @pytest.fixture
 def check(tmp_path, monkeypatch):
-    """Hold the Verilog of a core on a bus against its model."""
+    """Make a check that compares the Verilog of a core on a bus with its model."""
 
     def check(top, bus, simulator):
         if missing_tool(simulator):
@@ -103,7 +103,7 @@ def check(tmp_path, monkeypatch):
         for top in CORES
         for bus in BUSES
         for simulator in SIMULATORS
-        # Building the larger cores with access to every signal takes Verilator minutes. The classic bus is
+        # Verilator takes minutes to build the larger cores with access to every signal. The classic bus is
         # another handshake of the same hardware, whichever core is behind it.
         if top == "shader" or (simulator == "icarus" and not bus.endswith("classic"))
         if simulator == "icarus" or not bus.endswith("classic")

@@ -1,5 +1,8 @@
 # amaranth: UnusedElaboratable=no
-"""Verilog of the display in Icarus Verilog, its lanes decoded by cocotbext-dvi, which is none of ours."""
+"""Verilog of the display in Icarus Verilog.
+
+cocotbext-dvi, which shares no code with the project, decodes its lanes.
+"""
 
 from contextlib import suppress
 from importlib.util import find_spec
@@ -25,7 +28,7 @@ FOLDER = Path(__file__).parent
 
 
 def decode(folder, image, monkeypatch):
-    """Tests that failed, and what they say."""
+    """Tests that failed, and their messages."""
     if missing_tool("icarus") or not all(map(find_spec, ("cocotb", "cocotbext.dvi"))):
         pytest.skip(missing_tool("icarus") or "the Python package cocotbext-dvi is not installed")
     from cocotb_tools.runner import get_runner
@@ -46,11 +49,12 @@ def decode(folder, image, monkeypatch):
     settings = {
         "DVI_SIZE": "x".join(map(str, MODE.size)),
         "DVI_DRAW": "13000",
-        # Between the first and the last pixel of the pulse; the encoder and the crossing are behind by some.
+        # The frame is between the first and the last pixel of the pulse, because the encoder and the crossing
+        # are some cycles behind.
         "DVI_START": str(MODE.vertical.front * line),
         "DVI_IMAGE": str(folder / "image.png"),
     }
-    # The runner ends the process where a test fails; its file of results tells.
+    # The runner ends the process if a test fails; its file of results tells the reason.
     results = folder / "results.xml"
     with suppress(SystemExit):
         runner.test(
@@ -68,13 +72,13 @@ def decode(folder, image, monkeypatch):
 
 
 def test_an_independent_decoder_sees_the_frames(tmp_path, monkeypatch):
-    """Every pixel of two frames."""
+    """Every pixel of two frames is right."""
     image = PARAMETERS.compute(picture(PARAMETERS, 0))
     assert decode(tmp_path, image, monkeypatch) == []
 
 
 def test_it_sees_a_wrong_pixel(tmp_path, monkeypatch):
-    """A picture that is not the display's."""
+    """A picture that differs from the display's is found."""
     image = PARAMETERS.compute(picture(PARAMETERS, 0))
     image[9, 13, 1] ^= 4
     (failure,) = decode(tmp_path, image, monkeypatch)

@@ -1,8 +1,8 @@
 """Mapped ECP5 netlists with registers inside multipliers and memories, against the bit-accurate models.
 
-Cells are Yosys's models and ours. Quick: a unit, and faults that are injected into its netlist. Long: more
-units, and pipelines, whose netlists are proved to do what they did before the step. The default shades a
-frame.
+Models of cells are Yosys's and ours. The quick run has a unit, and faults that are injected into its netlist.
+The long run has more units, and pipelines, whose netlists are proved to do the same as before the step. The
+default pipeline shades a frame.
 """
 
 import copy
@@ -40,13 +40,16 @@ UNITS = (
 )
 
 READS = {"name": "lobe", "variant": "blinn", "beats": 1300}
-"""A unit that writes a block RAM and reads it through the register inside; more beats than table ends."""
+"""A unit that writes a block RAM and reads it through the register inside.
+
+There are more beats than table entries.
+"""
 
 DESIGNS = [preset(), preset("renormalise", "cosquad")]
-"""The default design, and one whose accumulators, roots and setup are others."""
+"""The default design, and a design with other accumulators, roots and setup."""
 
 FRAME = (20, 15), 64
-"""Size and triangles: Icarus simulates some ten cycles a second of a mapped pipeline."""
+"""Size and triangles. Icarus simulates about ten cycles a second of a mapped pipeline."""
 
 
 @pytest.fixture(scope="module")
@@ -65,7 +68,8 @@ def mapped(tmp_path_factory):
 
 @pytest.fixture
 def check(tmp_path, mapped):
-    """Hold a unit's netlist after the step, and after a change of its cells, against the unit's model."""
+    """Make a check that compares a unit's netlist after the step, and after a change of its cells, with the
+    unit's model."""
 
     def check(name, variant="", change=lambda cells: None, beats=BEATS):
         record, rng = RECORDS[name], np.random.default_rng(2026)
@@ -133,7 +137,10 @@ def test_faults_injected_in_a_memory_are_found(check, fault):
     "design", [pytest.param(of, id=f"{of.interpolator.name}-{of.specular.reflection.name}") for of in DESIGNS]
 )
 def test_a_frame_of_a_pipeline(design, tmp_path):
-    """The netlist before the step does the same, by proof; that of the default shades a frame."""
+    """A proof shows that the netlist before the step does the same.
+
+    The netlist of the default pipeline shades a frame.
+    """
     unit = ShadingPipelineUnit(design)
     before = map_component(unit, tmp_path)
     netlist, absorbed = absorb_registers(before)
@@ -142,7 +149,7 @@ def test_a_frame_of_a_pipeline(design, tmp_path):
     assert absorbed.removed
     assert same(before, netlist, tmp_path) == ""
     if design is not DESIGNS[0]:
-        # The proof is of every cycle.
+        # The proof covers every cycle.
         return
     spans, constants, pixels = teapot_frame(design, *FRAME)
     found = VerilogBench(unit, tmp_path, core(unit, verilog_of(netlist, tmp_path)), clean=False).run(

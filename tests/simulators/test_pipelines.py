@@ -1,6 +1,7 @@
 """Pipelines as Verilog, in Icarus Verilog and in Verilator, against the model, pixel by pixel, under stalls.
 
-A frame of each in one of both in the long run, and a small one of one in the quick run.
+In the long run one of both simulators draws a frame with each pipeline. In the quick run one simulator draws
+a small frame.
 """
 
 import numpy as np
@@ -21,12 +22,12 @@ VERILATED = (
     *("quotient, blinn", "renormalise, blinn", "chord-local", "3 lights", "compact", "gate, compact"),
     *("values, the second of 2 lights fades", "no specular light, grey, few bits"),
 )
-"""Pipelines that Verilator runs, and Icarus the others: both read the same text."""
+"""Pipelines that Verilator runs. Icarus runs the others. Both read the same text."""
 
 
 @pytest.fixture
 def check(tmp_path):
-    """Hold a pipeline's Verilog against its model."""
+    """Make a check that compares a pipeline's Verilog with its model."""
 
     def check(name, simulator, *size, **options):
         if missing_tool(simulator):

