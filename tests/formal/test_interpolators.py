@@ -411,8 +411,8 @@ BUGS = {
     "there is no room for a length": ("quadratic", "gpq.latency + 2", "gpq.latency - 3"),
     "a span does not wait for its differences": (
         "chord_spans",
-        "joined.valid.eq(lengths.r_rdy & known & (waits | ~is_long))",
-        "joined.valid.eq(lengths.r_rdy & known)",
+        "joined.valid.eq(lengths.r_rdy & (waits | ~is_long))",
+        "joined.valid.eq(lengths.r_rdy)",
     ),
     "differences stay": ("chord_spans", "taken & takes_long", "0", "_keep_words"),
     "starts stay": (
