@@ -16,15 +16,15 @@ def vertex_colors(channels: np.ndarray, whole: float | None = None) -> np.ndarra
 
     Parameters
     ----------
-    channels : array, shape (V, 3)
-        Numbers of a file.
+    channels : array
+        Numbers of a file, of all channels or of one.
     whole : float, optional
         The number that stands for full light. By default 255 if all numbers are whole and a number is over 1,
         else 1.
 
     Returns
     -------
-    float64 array, shape (V, 3)
+    float64 array, same shape
 
     Raises
     ------

@@ -9,7 +9,7 @@ from urllib.parse import unquote
 
 import numpy as np
 
-from blysk.sim.meshes.gltf_parts import MESHOPT, data_of_uri, listed, view_bytes, whole
+from blysk.sim.meshes.gltf_parts import MESHOPT, data_of_uri, holds_data, listed, view_bytes, whole
 from blysk.sim.meshes.gltf_textures import color_texture, texture_coordinates, texture_set
 from blysk.sim.meshes.materials import Found
 from blysk.sim.meshes.refusal import ONE_MATERIAL, REEXPORT, Refused, inside, shown
@@ -78,7 +78,7 @@ def gltf_buffers(document: dict, data: bytes, suffix: str, folder: Path) -> list
             found = _glb_chunk(data)
         elif not isinstance(uri, str):
             raise Refused(f"its buffer {number} has no data")
-        elif uri.startswith("data:"):
+        elif holds_data(uri):
             found = data_of_uri(uri, f"its buffer {number}")
         else:
             found = _beside(folder, uri)

@@ -3,11 +3,22 @@
 import base64
 import binascii
 import math
+import re
 from typing import Any
+from urllib.parse import unquote, unquote_to_bytes
 
 from blysk.sim.meshes.refusal import REEXPORT, Refused, shown
 
-__all__ = ["MESHOPT", "data_of_uri", "extension_of", "has_extension", "listed", "view_bytes", "whole"]
+__all__ = [
+    "MESHOPT",
+    "data_of_uri",
+    "extension_of",
+    "has_extension",
+    "holds_data",
+    "listed",
+    "view_bytes",
+    "whole",
+]
 
 MESHOPT = {"EXT_meshopt_compression", "KHR_meshopt_compression"}
 """Extensions that compress views, and have no decoder here. A view is read if its plain data is there."""
@@ -42,10 +53,23 @@ def whole(value: Any, what: str, below: float = math.inf, remedy: str = REEXPORT
     return value
 
 
+def holds_data(uri: str) -> bool:
+    """Whether a reference holds the data itself (RFC 2397), and names no file."""
+    return uri[:5].lower() == "data:"
+
+
 def data_of_uri(uri: str, what: str, remedy: str = REEXPORT) -> bytes:
-    """Bytes that the text of a reference holds; `Refused` if the text is not base64."""
+    """Bytes that the text of a reference holds: base64, or the characters themselves.
+
+    Both may have codes with ``%``. Base64 may have spaces, and may lack its padding. `Refused` if other
+    characters are in base64.
+    """
+    head, _, text = uri.partition(",")
+    if not re.search(r";\s*base64\s*$", head, re.IGNORECASE):
+        return unquote_to_bytes(text)
+    text = "".join(unquote(text).split()).rstrip("=")
     try:
-        return base64.b64decode(uri.partition("base64,")[2])
+        return base64.b64decode(text + "=" * (-len(text) % 4), validate=True)
     except (binascii.Error, ValueError):
         raise Refused(f"the text of {what} is not base64", remedy) from None
 

@@ -14,6 +14,7 @@ from blysk.sim.meshes.gltf_parts import (
     data_of_uri,
     extension_of,
     has_extension,
+    holds_data,
     listed,
     view_bytes,
     whole,
@@ -194,7 +195,7 @@ class GltfTextures:
         """Wrap modes, filter, and whether levels are used, as for `load_texture`."""
         small, mipmapped = _chosen(sampler, "minFilter", _MIN, 9987)
         filter = _chosen(sampler, "magFilter", _MAG, 9728 if small == "nearest" else 9729)
-        if filter != small:
+        if filter != small and "minFilter" in sampler:
             self._found.tell_names("of samplers", ["minFilter of another kind than magFilter"])
         wrap = _chosen(sampler, "wrapS", _WRAPS, 10497), _chosen(sampler, "wrapT", _WRAPS, 10497)
         return {"wrap": wrap, "filter": filter, "mipmapped": mipmapped}
@@ -210,7 +211,7 @@ class GltfTextures:
             data = view_bytes(self._views[place], self._buffers)
         elif not isinstance(uri, str):
             raise Refused(f"its image {number} has the uri {shown(str(uri))!r}, not a text", ONE_MATERIAL)
-        elif uri.startswith("data:"):
+        elif holds_data(uri):
             data = data_of_uri(uri, f"its image {number}", ONE_MATERIAL)
         else:
             name = unquote(uri)

@@ -337,7 +337,7 @@ def _load_scene(
     none = GltfViews([], [])
     suffix, found = path.suffix.lower(), Found()
     if suffix == ".obj":
-        data, libraries = split_obj(data, found)
+        data, libraries = split_obj(data, found, materials)
         for name in libraries:
             refers(path.parent, name, *name.split())
         images = {}

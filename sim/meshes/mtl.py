@@ -119,7 +119,7 @@ _OPTIONS = {
     **{"-s": (1, 3, None), "-o": (1, 3, None), "-clamp": (1, 1, None), "-t": (1, 3, r"[0.\s]+")},
     **{"-mm": (2, 2, r"0(\.0*)?\s+1(\.0*)?"), "-blendu": (1, 1, "on"), "-blendv": (1, 1, "on")},
     **{"-cc": (1, 1, "off"), "-texres": (1, 1, ".*"), "-boost": (1, 1, ".*"), "-bm": (1, 1, r"1(\.0*)?")},
-    **{"-imfchan": (1, 1, None), "-type": (1, 1, None)},
+    **{"-imfchan": (1, 1, None), "-type": (1, 1, None), "-colorspace": (1, 1, "sRGB|srgb")},
 }
 _VALUE = r"[-+]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][-+]?[0-9]+)?"
 
@@ -207,6 +207,8 @@ def _mtl_material(text: str, name: str, texture: Callable[[], Texture | None], f
             (maps if is_map else values)[keyword.lower() if is_map else keyword] = words
     # Texels of map_Kd multiply ambient light, too. So map_Ka with the same image counts as read.
     drawn = maps.pop("map_kd", None)
+    if drawn == []:
+        found.tell_names("of materials", ["map_Kd without a file"])
     found.tell_names("of materials", (f"alpha ({key})" for key in _ALPHA_MAPS if maps.pop(key.lower(), None)))
     others = [words for keyword, words in maps.items() if keyword != "map_ka" or words != drawn]
     found.tell("texture", "textures", len(others))

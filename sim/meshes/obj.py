@@ -18,13 +18,14 @@ __all__ = ["read_obj", "split_obj"]
 _STATEMENTS = {"usemtl", "mtllib", "o", "g", "s", "vt"}
 
 
-def split_obj(data: bytes, found: Found) -> tuple[bytes, list[str]]:
+def split_obj(data: bytes, found: Found, painted: bool) -> tuple[bytes, list[str]]:
     """An OBJ text with an object for each material, and the names of material files.
 
     An object's name is the number of its material. Statements of positions, normals, texture coordinates,
     faces and objects stay, each in a line of its own. Statements of other kinds are recorded as not read. A
     backslash at the end of a line continues the line, but not in a comment. In a material's name ``#`` begins
-    no comment, as in ``usemtl Material #25``.
+    no comment, as in ``usemtl Material #25``. If the file is ``painted``, colours in comments are recorded as
+    not read.
     """
     numbers = {"": 0}
     libraries = []
@@ -45,6 +46,9 @@ def split_obj(data: bytes, found: Found) -> tuple[bytes, list[str]]:
             found.readers.append(None)
         return b"o %d\n" % numbers[rest]
 
+    # ZBrush writes colours into comments.
+    if painted and re.search(rb"(?:\A|[\r\n])[ \t]*+#MRGB[ \t]", data):
+        found.tell("vertex colours in comments (#MRGB)")
     data = plain_lines(data)
     data = re.sub(rb"^[^\S\n]*+(?!(?:v[nt]?|f)(?!\S))(\S++)([^\n]*)\n?", replaced, data, flags=re.MULTILINE)
     if smooth and re.search(rb"^[ \t]*f[ \t]+[^\s/]+(?:/[^\s/]*)?(?!\S)", data, re.MULTILINE):

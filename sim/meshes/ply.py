@@ -217,9 +217,14 @@ def _colors(vertex: _Columns, elements: list[_Element]) -> np.ndarray | None:
     }
     for names in _CHANNELS:
         table = _table(vertex, names)
-        if table is not None:
-            kind = kinds[names[0]]
-            return vertex_colors(table, {"u2": 65535.0}.get(kind, None if kind[0] == "f" else 255.0))
+        if table is None:
+            continue
+        whole = [{"u2": 65535.0}.get(kinds[name], None if kinds[name][0] == "f" else 255.0) for name in names]
+        if len(set(whole)) == 1:
+            return vertex_colors(table, whole[0])
+        # A number's type says which number is full light.
+        columns = zip(table.T, whole, strict=True)
+        return np.column_stack([vertex_colors(column, of or 1.0) for column, of in columns])
     return None
 
 

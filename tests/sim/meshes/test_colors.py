@@ -101,6 +101,8 @@ MAPPED = f"mtllib a.mtl\n{CORNERS}vt 0 0\nvt 1 0 0\nvt .25 .75\nusemtl a\nf 1/1 
         ("-s 2 4 1 -o .5 .25", (2, 4), (0.5, 0.25), "repeat", ()),
         ("-clamp on", (1, 1), (0, 0), "clamp", ()),
         ("-clamp off -blendu on -blendv on -mm 0 1 -t 0 0 0 -texres 64", (1, 1), (0, 0), "repeat", ()),
+        ("-colorspace sRGB", (1, 1), (0, 0), "repeat", ()),
+        ("-colorspace linear", (1, 1), (0, 0), "repeat", ("options of map_Kd: -colorspace linear",)),
         (
             "-bm 2 -mm .1 1 -blendu off",
             (1, 1),
@@ -168,6 +170,8 @@ def test_obj_images_that_are_not_read(tmp_path):
         loaded = load(tmp_path / "in" / "a.obj", MAPPED)
         assert loaded.ignored == (f"the image {name!r}, {reason}",)
         assert (loaded.materials[0].texture, len(loaded.mesh.coordinates)) == (None, 0)
+    put(tmp_path / "in" / "a.mtl", "newmtl a\nmap_Kd\n")
+    assert load(tmp_path / "in" / "a.obj", MAPPED).ignored == ("of materials: map_Kd without a file",)
     put(tmp_path / "in" / "a.mtl", "newmtl a\nmap_Kd a.png\n")
     put(tmp_path / "in" / "a.png", b"damaged")
     check_refused(tmp_path / "in" / "a.obj", "its image 'a.png' is damaged", content=MAPPED)
@@ -278,6 +282,14 @@ def test_ply_colours(tmp_path, kind, rows, prefix):
     same(at_corners(loaded, loaded.mesh.colors), dict(zip(TRIANGLE_PLACES, colors, strict=True)))
     assert (loaded.ignored, loaded.materials[0].colored) == ((), True)
     assert len(load_mesh(str(tmp_path / "a.ply"), materials=False).mesh.colors) == 0
+
+
+def test_ply_colours_of_several_types(tmp_path):
+    text = ply_of("uchar", ("red", "green", "blue"), ("51 .4 0", "255 .8 0", "0 0 65535"))
+    text = text.replace("uchar green", "float green").replace("uchar blue", "ushort blue")
+    colors = (linear(51, 102, 0), linear(255, 204, 0), linear(0, 0, 255))
+    loaded = load(tmp_path / "a.ply", text)
+    same(at_corners(loaded, loaded.mesh.colors), dict(zip(TRIANGLE_PLACES, colors, strict=True)))
 
 
 def test_binary_ply_colours(tmp_path):

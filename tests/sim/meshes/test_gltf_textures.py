@@ -15,6 +15,7 @@ from blysk.sim.meshes.mesh import load_mesh
 from blysk.sim.run_files import OutputIsInput, RunFiles
 
 from .files import (
+    TRIANGLE,
     check,
     check_refused,
     load,
@@ -34,6 +35,36 @@ def test_texture_in_the_buffer(tmp_path):
     assert (texture.wrap, texture.filter, texture.mipmapped) == (("repeat", "repeat"), "bilinear", True)
     assert at_vertices(loaded, loaded.mesh.coordinates) == PLACES
     assert len(loaded.mesh.colors) == 0
+
+
+def coded(data):
+    """A text with a code for each byte."""
+    return "".join(f"%{byte:02X}" for byte in data)
+
+
+IN_BASE64 = base64.b64encode(CHECKER).decode()
+
+
+@pytest.mark.parametrize(
+    "uri",
+    [
+        "data:image/png;base64," + coded(IN_BASE64.encode()),
+        "data:image/png;base64," + IN_BASE64.rstrip("="),
+        f"data:image/png;base64,{IN_BASE64[:20]}\n {IN_BASE64[20:]}",
+        f"DATA:image/png;name=a;BASE64,{IN_BASE64}",
+        "data:image/png," + coded(CHECKER),
+    ],
+)
+def test_data_in_the_text_of_a_reference(tmp_path, uri):
+    """As RFC 2397 allows, for an image and for a buffer."""
+    loaded = check(load(tmp_path / "a.glb", textured(image={"uri": uri})))
+    assert (loaded.ignored, loaded.materials[0].texture.size) == ((), (2, 2))
+    document, buffer = textured()
+    text = uri.partition(",")[2]
+    whole = base64.b64encode(buffer).decode()
+    of = {coded(IN_BASE64.encode()): coded(whole.encode()), coded(CHECKER): coded(buffer)}
+    document["buffers"][0]["uri"] = uri.replace(text, of.get(text, whole))
+    assert load(tmp_path / "a.gltf", (document, buffer)).mesh.vertices.tolist() == np.array(TRIANGLE).tolist()
 
 
 @pytest.mark.parametrize("kind", ["data", "file", "encoded name", "in a folder"])
@@ -109,11 +140,12 @@ def huge_png(width, height):
         ({}, "its image 0 has no data"),
         ({"uri": 5}, "its image 0 has the uri '5', not a text"),
         ({"uri": "data:;base64,A"}, "the text of its image 0 is not base64"),
+        ({"uri": "data:;base64,@@" + base64.b64encode(CHECKER).decode()}, "its image 0 is not base64"),
         ({"uri": "data:,"}, "its image 'number 0' is empty"),
         ({"bufferView": 9}, "it has an image in the view 9 (from 0), but there are 3"),
         ({"bufferView": -1}, "it has an image in the view -1, not a whole number from 0"),
     ],
-    ids=range(9),
+    ids=range(10),
 )
 def test_unusable_images(tmp_path, image, reason):
     check_refused(tmp_path / "a.glb", reason, "with one material", content=textured(image=image))
@@ -162,6 +194,7 @@ def test_unusable_references_of_textures(tmp_path, parts, reason):
         ({"wrapS": 33648, "wrapT": 33071}, (("mirror", "clamp"), "bilinear", True), ()),
         ({"magFilter": 9728, "minFilter": 9728}, (("repeat", "repeat"), "nearest", False), ()),
         ({"minFilter": 9984}, (("repeat", "repeat"), "nearest", True), ()),
+        ({"magFilter": 9728}, (("repeat", "repeat"), "nearest", True), ()),
         ({"magFilter": 9729, "minFilter": 9729}, (("repeat", "repeat"), "bilinear", False), ()),
         ({"magFilter": 9729, "minFilter": 9987}, (("repeat", "repeat"), "bilinear", True), ()),
         (

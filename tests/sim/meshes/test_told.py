@@ -23,6 +23,10 @@ OBJ_TOLD = {
     "mixed colours": ("v 0 0 0 1 0 0\nv 1 0 0\nv 0 1 0\n" + FACE, ("2 missing colours of vertices",)),
     "transparent": ("v 0 0 0 1 0 0 .5\nv 1 0 0 0 0 0 1\nv 0 1 0 1 0 0 1\n" + FACE, ("vertex alpha",)),
     "smooth": (CORNERS + "s 1\n" + FACE, ("smoothing groups (--crease says which edges are sharp)",)),
+    "colours in comments": (
+        CORNERS + "#MRGB ffff0000ff00ff00ff0000ff\n" + FACE,
+        ("vertex colours in comments (#MRGB)",),
+    ),
     "flat": (CORNERS + "s off\nf 1/1 2/2 3/3\n", ("smoothing groups (--crease says which edges are sharp)",)),
     "smooth, with normals": (CORNERS + "vn 0 0 1\ns 1\nf 1//1 2//1 3//1\n", ()),
     "no library": ("usemtl a\n" + OBJ, ("1 material name without a definition",)),
