@@ -12,6 +12,8 @@ from blysk.golden.render import Renderer
 from blysk.hdl.bus.framing import FramingUnit
 from blysk.sim.engines.simulate import simulate
 
+pytestmark = [pytest.mark.long, pytest.mark.ci]
+
 SIZE = 16, 8
 STEPS = 256
 DESIGN = preset("linear", "cosquad", x_bits=4, y_bits=4, materials=3).built(

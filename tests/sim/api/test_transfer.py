@@ -36,6 +36,8 @@ def test_errors_are_in_the_space_of_the_picture(frames):
         assert f"LSB of {space}" in frame._repr_html_()
 
 
+@pytest.mark.long
+@pytest.mark.ci
 def test_verilog_says_its_transfer():
     for transfer, space in (("linear", "linear light"), ("srgb", "sRGB")):
         text = blysk.verilog(blysk.design(transfer=transfer))

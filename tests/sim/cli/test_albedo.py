@@ -14,6 +14,8 @@ SMALL = "--method", "linear", "--model", "cosquad"
 TRIANGLES = "--geometry", "hardware", "--albedo", "colors"
 
 
+@pytest.mark.long
+@pytest.mark.ci
 def test_verilog():
     """The words are those of Python. Attributes of spans, and texels outside, have described ports."""
     assert main(["verilog", *SMALL, "--albedo", "colors,nearest,outside", "-o", "core.v"]) == 0
