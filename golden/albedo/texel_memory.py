@@ -110,7 +110,7 @@ class LoadedTextures:
 
     @property
     def words(self) -> np.ndarray:
-        """Words of the banks, shape (words, 4), 36 bits: red from the lowest bit up, green, blue."""
+        """Words of the banks, shape (words, 4), 36 bits. From the lowest bit up: red, green, blue."""
         bits = TexelMemory.CHANNEL_BITS
         red, green, blue = np.moveaxis(self.codes, -1, 0)
         found: np.ndarray = red | green << bits | blue << 2 * bits

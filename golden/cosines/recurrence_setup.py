@@ -284,7 +284,7 @@ class RecurrenceSetup:
         return (cosine + cosine.scale(-16).truncate(34)).saturate(self.COSINE_FORMAT)
 
     def _normalised(self, chord: Fixed) -> tuple[Fixed, np.ndarray]:
-        """Word of q, shifted left into [1/2, 1) unless q is 0, and the shift."""
+        """Word of q, and its left shift. The word is in [1/2, 1), unless q is 0."""
         shift = np.full_like(chord.codes, self.CHORD_SHIFT)
         for j in range(self.CHORD_SHIFT - 1, -1, -1):
             shift[chord.codes >> (34 - j) > 0] = j

@@ -57,7 +57,7 @@ class Picture:
 
 
 def background_code(scene: Scene, transfer: str) -> np.ndarray:
-    """Codes of a scene's background, uint8, shape (3,): encoded, and rounded to the nearest code, half up."""
+    """Codes of a scene's background, uint8, shape (3,): the encoded background, rounded half up."""
     codes: np.ndarray = np.floor(255 * encode(scene.background, transfer) + 0.5).astype(np.uint8)
     return codes
 

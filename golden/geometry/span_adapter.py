@@ -99,7 +99,7 @@ class LineAdapter:
 
 
 def shading_spans(spans: TrueSpans | LineSpans | VectorSpans) -> Spans:
-    """Spans of the shading pipeline, with first pixel, length, material, and normals, true line or vectors.
+    """Spans of the shading pipeline: first pixel, length and material, with normals, true line or vectors.
 
     Parameters
     ----------

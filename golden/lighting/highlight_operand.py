@@ -163,7 +163,7 @@ class HighlightOperand:
 
     @property
     def last_lit_arguments(self) -> np.ndarray:
-        """Largest ``1 - cos gamma``, in steps of 2^-25, that may give a term over 0, for each exponent.
+        """For each exponent the largest ``1 - cos gamma`` that may give a term over 0, in steps of 2^-25.
 
         int64 array, shape (1024,). It is 2^27 if every argument may give a term over 0.
         """

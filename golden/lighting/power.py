@@ -96,7 +96,7 @@ class Power(HighlightOperand):
         return (one - s).truncate(17).saturate(self.RESULT_FORMAT)
 
     def complement(self, operand: Fixed, dark: np.ndarray, exponent: int) -> Fixed:
-        """One minus the term, before its last bits are cut, UQ(0, 34); parameters as for `compute`."""
+        """One minus the term, in UQ(0, 34), before its last bits are cut. Parameters as for `compute`."""
         x = self.one_minus(operand, exponent).extend(SQ(5, 34))
         format = self.COMPLEMENT_FORMAT
         x = Fixed(format, np.where(dark, format.max_code, x.saturate(format).codes))

@@ -170,8 +170,8 @@ class LocalChordInterpolator(Interpolator):
         """Lines that describe the values of a span, see `Interpolator.input_lines`."""
         diffuse, highlight = ChordSetup.DIFFUSE_FORMAT, ChordSetup.HIGHLIGHT_FORMAT
         lines = [
-            f"i_values: a light's three codes of N.L, {diffuse}, and three of 1 - N.H, {highlight},",
-            "times (1 - 2^-17)^2: at the first pixel, the middle, the last pixel; no L and H are read",
+            f"i_values: for each light three codes of N.L in {diffuse}, and three of 1 - N.H in {highlight},",
+            "each times (1 - 2^-17)^2, at the first pixel, the middle, the last pixel; L and H are not read",
         ]
         if self.scale:
             lines.append(f"1 - N.H is times {1 << self.scale}, at most 1, also as argument of the table")

@@ -108,7 +108,9 @@ class QuotientInterpolator(Interpolator):
         """Lines that describe vectors and their frames, see `Interpolator.input_lines`."""
         model = self.spans(lights, highlights)
         mirrored = (
-            ["y_k is times cos a of light k; s0 is y of light 0 times its sin a."] if model.mirror else []
+            ["i_start: y_k is times cos a of light k; s0 is y of light 0 times its sin a"]
+            if model.mirror
+            else []
         )
         axes = (
             [
@@ -124,23 +126,24 @@ class QuotientInterpolator(Interpolator):
                 "Of a further light z = L alone. L, H are not read."
             ]
         )
-        constants = [f"constants: of L write sin a, 0, cos a, times {model.ONE}; H is not read"]
+        # The header of a core that takes triangles leaves out lines that begin with ``i_``.
         return [
             *axes,
             "v = N/W, linear on the screen: each corner's normal divided by its W, interpolated.",
-            f"i_start: components {', '.join(model.components)} of v at the first pixel centre.",
+            f"i_start: components {', '.join(model.components)} of v at the first pixel centre, "
+            f"in {model.COMPONENT_FORMAT}, above -1",
             *mirrored,
-            f"Codes of {model.COMPONENT_FORMAT}, above -1: scale both ends of a span by one factor, so",
-            f"that the largest component at an end is 1/2 to 1 - {MARGIN} 2^-17. At 1 it would wrap.",
-            "i_step: the same components of (v at the last pixel - v at the first)/(length - 1), times",
-            "2^i_exponent. i_exponent: the largest with which i_step fits, "
-            "at most ceil(log2(length - 1)) + 3.",
-            "Halve a span where |v| at its ends differs by a factor over 2, "
-            "or where they are over 90 degrees",
-            "apart. Divide a span of two pixels into two spans of one pixel, whose step is 0. "
-            "A span with a pixel of |v| under",
-            "1/128, which these cuts exclude, is wrong, and counted in status_out_of_range_spans.",
-            *(constants if highlights else []),
+            "i_start: scale both ends of a span by one factor, so that the largest component at an end is "
+            f"1/2 to 1 - {MARGIN} 2^-17; at 1 it would wrap",
+            "i_step: the same components of (v at the last pixel - v at the first)/(length - 1), "
+            "times 2^i_exponent",
+            "i_exponent: the largest with which i_step fits, at most ceil(log2(length - 1)) + 3",
+            "i_length: halve a span if |v| at its ends differs by a factor over 2, or if the ends are over "
+            "90 degrees apart",
+            "i_length: divide a span of two pixels into two spans of one pixel, whose step is 0",
+            "i_length: after these cuts no |v| is under 1/128; a span with a shorter v is wrong, "
+            "and counted in status_out_of_range_spans",
+            *([f"constants: as L write sin a, 0, cos a, times {model.ONE}; H is not read"] * highlights),
         ]
 
     def geometry(self, lights: int) -> Geometry:

@@ -80,9 +80,9 @@ class RenormaliseInterpolator(NormalInterpolator):
     def input_lines(self, lights: int, highlights: bool, factors: Sequence[int]) -> list[str]:
         """Line that describes the ends of the true line, see `Interpolator.input_lines`."""
         return [
-            "i_normal_*: ends of the line that is linear on the screen, N/W; the longer has length 1, "
-            f"in {self.END_FORMAT}; pixels whose vector has every component under 1/256 are wrong, and "
-            "their spans are counted in status_out_of_range_spans"
+            "i_normal_*: N/W at the ends of a span, scaled so that the longer of both vectors has length 1, "
+            f"in {self.END_FORMAT}; a pixel whose N/W has every component under 1/256 is wrong, and its span "
+            "is counted in status_out_of_range_spans"
         ]
 
     def geometry(self, lights: int) -> Geometry:

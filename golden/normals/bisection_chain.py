@@ -81,7 +81,8 @@ class BisectionChain:
             exact = half_angle_factor(1 - cosines) - 0.5
             fitted = np.polynomial.polynomial.polyval(x, np.r_[constant.values, rest.values])
             slope = (0.3536 if first else 0.1585) * (1.2 if p.as_published else 1)
-            # Errors of the fit, of u or r in 17 bits, of the sums and of e itself, and then the error of u.
+            # e has four errors of its own: of the fit, of u or r in 17 bits, of the sums, and of its
+            # rounding. The error of u comes from the step before.
             own_error = (
                 np.abs(fitted - exact).max()
                 + slope * 2.0**-18 * (1 + p.reads_cosine(first))

@@ -238,7 +238,7 @@ def _counting(counts: np.ndarray) -> np.ndarray:
 def _spans(
     pieces: _Pieces, width: int, height: int
 ) -> Iterator[tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray, np.ndarray, np.ndarray]]:
-    """Spans in chunks: piece, x, y, length, nearness at the first pixel, and its step from pixel to pixel."""
+    """Spans in chunks: piece, x, y, length, nearness at the first pixel, step of nearness per pixel."""
     a, b, c = pieces.edges()
     # A pixel centre exactly on an edge belongs to the triangle on whose left or top that edge is.
     top_left = (a > 0) | ((a == 0) & (b > 0))
@@ -367,7 +367,7 @@ def rasterise(scene: Scene) -> Raster:
 
 
 def _drawn(scene: Scene, pieces: _Pieces) -> tuple[np.ndarray, np.ndarray, int]:
-    """Piece, first x, y and length of every span, shape (4, spans); the span that a pixel shows, or -1.
+    """Piece, first x, y and length of every span, shape (4, spans), and the span of each pixel, or -1.
 
     Also returns the number of dropped fragments.
     """
@@ -429,7 +429,7 @@ def _dropped(
 
 
 class _End(NamedTuple):
-    """Ends of spans on one side: weights, unit normals, their lengths before, whether a normal was lost."""
+    """Ends of spans on one side: weights, unit normals, lengths before normalising, flags of lost normals."""
 
     weights: np.ndarray
     normal: np.ndarray

@@ -19,11 +19,10 @@ __all__ = [
 ]
 
 SPACES = {"srgb": "sRGB", "linear": "linear light"}
-"""Output transfers, and the names of the spaces of their codes, for texts: the curve of sRGB, or light as it
-is."""
+"""For each output transfer the name of the space of its codes, for texts."""
 
 TRANSFERS = tuple(SPACES)
-"""Output transfers."""
+"""Output transfers: the curve of sRGB, or light as it is."""
 
 LARGEST_SLOPE = 12.92
 """Slope of the curve of sRGB at black, its largest."""

@@ -7,7 +7,7 @@ from blysk.golden.video.motion import ANGLE_BITS
 __all__ = ["BUTTONS", "ControlState", "Controls"]
 
 BUTTONS = ("pause", "step", "material", "light")
-"""Buttons: stop or go on; turn the other way, or turn one step in a pause; next material; next light."""
+"""Buttons: stop or go on; turn the other way (in a pause: turn by one step); next material; next light."""
 
 
 @dataclass(frozen=True)

@@ -85,7 +85,7 @@ VGA = DisplayMode()
 
 @dataclass(frozen=True)
 class DisplayTiming:
-    """Position, whether it is in the picture, and both sync signals, for each cycle of the pixel clock.
+    """For each cycle of the pixel clock: position, whether it is in the picture, and both sync signals.
 
     Cycle 0 is the first pixel below the picture. So the blank lines come before the first frame. The position
     includes the porches: x is below the line's total, y below the frame's total. The vertical sync signal

@@ -16,7 +16,7 @@ KINDS = ("end", "transform", "frame_constant", "constant", "draw")
 _FIELDS = {"kind": 3, "index": 9, "first": 12, "count": 12}
 
 COMMAND_BITS = sum(_FIELDS.values())
-"""Bits of a command: kind, index, first, count from the lowest bit up."""
+"""Bits of a command. From the lowest bit up: kind, index, first, count."""
 
 _ONCE = (KINDS.index("transform"), KINDS.index("frame_constant"))
 
@@ -92,8 +92,7 @@ class DrawCommands:
         cull: Sequence[int] = (),
         sets: Sequence[int] | None = None,
     ) -> "DrawCommands":
-        """A list for each preset, with its constants, a transform of each part by its own slot, and the
-        draws.
+        """A list for each preset: constants, a transform of each part by the part's own slot, draws.
 
         Parameters
         ----------

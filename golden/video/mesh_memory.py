@@ -139,7 +139,7 @@ class MeshMemory:
 
     @property
     def vertex_words(self) -> list[int]:
-        """Words of the vertices: position x, y, z, normal x, y, z from the lowest bit up."""
+        """Words of the vertices. From the lowest bit up: position x, y, z, then normal x, y, z."""
         return _words(np.concatenate((self.position, self.normal), axis=1), COMPONENT.width)
 
     @property

@@ -229,7 +229,7 @@ class AngularSetupUnit(PipelinedUnit):
         return g.register(f"{name}_result", lambda rounded: rounded.saturate(format), rounded)
 
     def _address(self, name: str, bits: Word, width: int) -> tuple[Word, Word]:
-        """Address of a table, from the leading bits, and the fraction, from the bits below."""
+        """Address of a table from the leading bits, and fraction from the bits below."""
         g, p = self._graph, self.model
         below = width - p.ADDRESS_BITS
         return (

@@ -448,7 +448,8 @@ class QuotientSpansUnit(wiring.Component):
 
     def _take(self, m: Module, advance: Value, takes: Any, waits: Any, start: stream.Interface) -> None:
         """Take words of a span when the span before does not need its own words any more. Count pixels."""
-        # Whether at most one, two, three pixels of a span are left, counting the pixel on the output.
+        # Three bits: at most one, at most two, at most three pixels of a span are left. The pixel on the
+        # output counts.
         last, two, three = (Signal(name=name, init=1) for name in ("last", "two_left", "three_left"))
         left, valid = Signal(self.length_bits, name="left"), Signal(name="valid")
         # Whether second and first differences of the next span were taken, and whether they may be taken.

@@ -186,7 +186,7 @@ class RecurrenceSetupUnit(PipelinedUnit):
     def _step_functions(
         self, q_square: Word, exponent: Word
     ) -> tuple[Word, tuple[Word, Word], tuple[Word, Word]]:
-        """Words of ``1 - sin d/d``, and K with its shift, first for a step d, then for 4d."""
+        """Words of ``1 - sin d/d``, of K for a step d with its shift, and of K for 4d with its shift."""
         g, p = self._graph, self.model
         bits = g.register(
             "step_coarse",
@@ -366,7 +366,7 @@ class RecurrenceSetupUnit(PipelinedUnit):
         return register(FixedValue(self._shifted, Value.cast(coarse) >> fine), "shifted")
 
     def _normalised(self, chord: Word) -> tuple[Word, Word]:
-        """Word of a chord, shifted into [1/2, 1) unless the chord is 0, and the left shift."""
+        """Word of a chord, and its left shift. The word is in [1/2, 1), unless the chord is 0."""
         g, p = self._graph, self.model
 
         def shift_of(chord):

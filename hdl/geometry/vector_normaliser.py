@@ -335,7 +335,7 @@ def _root(p: VectorNormaliser, c0: Value, product: Value) -> Value:
 
 
 def _excess(p: VectorNormaliser, f: Value, large: Value) -> FixedValue:
-    """``e = f - 1``, or ``f/2 - 1`` if ``large``: in steps of 2^-21, so that f/2 is exact, then rounded."""
+    """Factor ``e = f - 1``, or ``f/2 - 1`` if ``large``, rounded. Before, in steps of 2^-21, f/2 is exact."""
     one = 1 << p.C0_FORMAT.fraction_bits
     e = FixedValue(SQ(2, 21), Mux(large, f - 2 * one, (f - one) << 1)[:23].as_signed())
     return e.round_half_up(17).wrap(p.FACTOR_FORMAT)

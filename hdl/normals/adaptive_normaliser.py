@@ -100,7 +100,7 @@ class AdaptiveNormaliserUnit(wiring.Component):
         return latency + 6 + bisected
 
     def elaborate(self, platform):
-        """Levels, segments, FIFO, normals."""
+        """The three parts, which make levels, segments and normals, and the FIFO of segments."""
         p = self.model
         m = Module()
         segment_shape = data.StructLayout(

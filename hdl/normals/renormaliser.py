@@ -112,7 +112,7 @@ class RenormaliserUnit(PipelinedUnit):
         return result
 
     def _scaled(self, m, vector):
-        """w, four cycles after the vector, and whether the vector is too short, two cycles after it."""
+        """Word w four cycles after the vector, and after two cycles whether the vector is too short."""
         p, register = self.model, self.register
         codes = [vector[c].as_value() for c in range(3)]
         magnitudes = [Mux(code[-1], ~code, code)[:-1] for code in codes]

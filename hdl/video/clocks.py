@@ -10,7 +10,7 @@ __all__ = ["ClockUnit"]
 
 
 class ClockUnit(wiring.Component):
-    """ECP5's PLL, ``EHXPLLL``, which drives the domains ``sync``, ``pixel``, ``serial``.
+    """The PLL of an ECP5, ``EHXPLLL``. It drives the domains ``sync``, ``pixel`` and ``serial``.
 
     Each clock has a gate, ``DCCA``, which lets only whole pulses through. A clock stands still until the PLL
     is locked. So every register starts as the configuration set it, and no register needs a reset. The net of

@@ -198,3 +198,12 @@ def test_vectors_through_0_are_flagged():
     vectors = SpanVectors.quantise(ends, -ends, np.array([9, 9]))
     codes = np.array([[0, 0, spans.ONE]])
     assert method.compute_vectors(spans, vectors, np.array([9, 9]), codes).out_of_range.all()
+
+
+@pytest.mark.parametrize("mirror", [False, True])
+def test_lines_about_spans_begin_with_their_port(mirror):
+    """A core that takes triangles leaves out lines that begin with ``i_``. No other line is about spans."""
+    lines = QuotientInterpolator(mirror).input_lines(2, True, ())
+    kept = [line for line in lines if not line.startswith("i_")]
+    assert len(kept) < len(lines)
+    assert not [line for line in kept if "i_" in line or " span" in line or "SQ(" in line]
