@@ -101,7 +101,7 @@ def test_design_that_cannot_be(refused, command):
     says = "method linear is not built for it; "
     refused(*command, "--method", "linear", "--setup-interval", "26", thing="--setup-interval 26", says=says)
     if command[0] == "verilog":
-        refused(*command, "--factors", "1", thing="--factors 1", says="need values of spans, of chord-local")
+        refused(*command, "--factors", "1", thing="--factors 1", says="need the method chord-local")
         local = ["--method", "chord-local", "--factors", "2"]
         refused(*command, *local, thing="--factors 2", says="and at most as many factors as lights")
 
