@@ -67,7 +67,7 @@ def _textured(triangles: int) -> tuple[Mesh, Texture]:
 
 
 def _colored(triangles: int) -> tuple[Mesh, None]:
-    """The teapot. The position of a vertex is its colour."""
+    """The teapot with vertex colours. The colour of a vertex is its position, as shares of the box."""
     mesh = teapot(triangles)
     return replace(mesh, colors=np.clip(_shares(mesh.vertices), 0, 1)), None
 
@@ -143,9 +143,9 @@ def measure(
     dict
         - ``error``, ``bound``: largest error off the borders (see `border_mask`), and its bound, in LSB of
           the frame's codes;
-        - ``pixels``, ``border_pixels``: shown pixels, and those of them at a border;
+        - ``pixels``, ``border_pixels``: number of shown pixels, and number of shown pixels at a border;
         - ``border_error``: largest error at a border, in LSB;
-        - ``cycles_per_pixel``: cycles of `frame_cycles` without writes, for a shaded pixel;
+        - ``cycles_per_pixel``: cycles of `frame_cycles` without writes, divided by the shaded pixels;
         - ``writes``: writes of constants and texels.
     """
     scene = scene_of(name, filter, projection, contrast, size)
@@ -238,8 +238,8 @@ def section(tasks: Sequence[Task], results: Sequence[Any]) -> Section:
         "camera sees the floor at a grazing angle, and is rolled, so depths differ along a scanline. A "
         "full report also has a teapot with vertex colours: each colour is the position of its vertex.",
         f"The largest error off the borders is {worst}. The goal is {GOAL:g} LSB, and {within} of "
-        f"{len(frames)} frames reach it. {len(proved)} of {len(frames)} frames have a proved bound, and "
-        f"{sum(of['error'] <= of['bound'] for of in proved)} of these are within it.",
+        f"{len(frames)} frames reach it. {len(proved)} of {len(frames)} frames have a proved bound. In "
+        f"{sum(of['error'] <= of['bound'] for of in proved)} of these frames the error is within the bound.",
     ]
     parts: list[Table | Drawing] = [_table(full, designs)]
     if len({of["contrast"] for of in steepest}) > 1:
@@ -254,7 +254,13 @@ def _is_steepest(frame: Mapping[str, Any]) -> bool:
 
 def _table(frames: Sequence[Mapping[str, Any]], designs: Mapping[str, int]) -> Table:
     columns = ("surface", "filter", "projection", "space", "largest error, LSB", "bound, LSB", "pixels")
-    columns += ("pixels at a border", "largest error there, LSB", "cycles a pixel", "writes", "multipliers")
+    columns += (
+        "pixels at a border",
+        "largest error at a border, LSB",
+        "cycles a pixel",
+        "writes",
+        "multipliers",
+    )
     keys = ("error", "bound", "pixels", "border_pixels", "border_error", "cycles_per_pixel", "writes")
     rows, grades = [], []
     for of in frames:
@@ -302,9 +308,9 @@ def _drawing(frames: Sequence[Mapping[str, Any]]) -> Drawing:
     panels[0].set_ylabel("error, LSB")
     figure.legend(*panels[0].get_legend_handles_labels(), loc="outside right center", frameon=False)
     note = (
-        f"Surface: {STEEPEST}, `bilinear`, in perspective. Texels differ by the contrast, around 1/2. In "
-        "linear light the bound rises in a straight line with the contrast. In sRGB it also rises because "
-        "darker texels have a steeper part of the curve."
+        f"Surface: {STEEPEST}, `bilinear`, in perspective. Texels lie around 1/2, and differ by at most the "
+        "contrast. In linear light the bound rises in a straight line with the contrast. In sRGB the bound "
+        "also rises because the curve is steeper for darker texels."
     )
     return Drawing(
         "albedo-contrast", "Largest error and bound against the contrast of texels", svg(figure), note

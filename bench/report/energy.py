@@ -38,10 +38,10 @@ __all__ = [
 ]
 
 METHODS = tuple(name for name, of in ALL_METHODS.items() if of.serves_gate and of.ORIGIN != "own")
-"""Methods of unit normals, which serve the gate: linear, and the methods of the documents."""
+"""Methods that serve the gate: ``linear`` and the methods of the documents."""
 
 METHOD = "quadratic"
-"""Method of `METHODS` that has every model."""
+"""Method of `METHODS` that is measured with every model."""
 
 MODELS = ("cosquad", "coscos4", "blinn_product")
 EXPONENTS = (2, 50, 1000)
@@ -189,7 +189,7 @@ def section(tasks: Sequence[Task], results: Sequence[Any]) -> Section:
         "a span counts more when spans are short. These spans have "
         f"{pair[False]['pixels'] / pair[False]['spans']:.1f} pixels on average.",
         "Methods of unit normals can have a highlight gate. The gate stops the specular unit in spans "
-        "without a highlight, and its own registers switch once a span. With the gate the count of the "
+        "without a highlight. The gate's own registers switch once a span. With the gate the count of the "
         "whole pipeline changes by "
         f"{' to '.join(dict.fromkeys(_change(key, saved) for key in (best, worst)))}.",
         "**Not counted**: bits inside multipliers and other logic between two registers, glitches, wires, "

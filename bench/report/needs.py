@@ -176,7 +176,7 @@ def tasks(quick: bool) -> list[Task]:
 
 
 def section(tasks: Sequence[Task], results: Sequence[Any]) -> Section:
-    """The section: reductions of each scene, their savings, and whether its frame stays the same."""
+    """The section: reductions of each scene, their savings, and whether the scene's frame stays the same."""
     found: dict[str, dict[str, Any]] = {}
     for task, result in zip(tasks, results, strict=True):
         # Models and simulation both count different pixels. The larger number is kept.

@@ -43,7 +43,7 @@ AXES = {
     "ciede2000_max": "CIEDE2000 colour difference. An eye just notices about 2.3. The value of the worst "
     "pixel.",
     "cycles_per_pixel": "Cycles of the simulated pipeline from the first write of a constant to the last "
-    "pixel, divided by its pixels.",
+    "pixel, divided by the number of pixels.",
     "ns_per_pixel": "Cycles a pixel at the clock rate after place and route.",
     "multipliers": "Multipliers of 18x18 bits in the netlist. None is shared with other logic.",
     "luts": "Look-up tables of four inputs after place and route, one light, three channels.",

@@ -1,4 +1,4 @@
-"""Claims of [P] on Phong's and Blinn's highlights: exponents, operations, times, and their shapes."""
+"""Claims of [P] on Phong's and Blinn's highlights: exponents, operations, times, and shapes of highlights."""
 
 import base64
 import io
@@ -337,7 +337,7 @@ def _frames(quick: bool) -> list[Claim]:
         settings = {"triangles": triangles, **size, "repeats": 9 if quick else 2}
         for key, what in (
             ("frame", "time of a frame saved by Blinn"),
-            ("shading", "time of its shading saved by Blinn"),
+            ("shading", "time of the frame's shading saved by Blinn"),
             ("geometry", "share of geometry in Blinn's frame"),
         ):
             printed = "40 to 45" if key == "frame" and triangles == 1_000_000 else ""

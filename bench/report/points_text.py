@@ -100,7 +100,7 @@ def text(points: Sequence[Mapping[str, Any]]) -> list[str]:
         "- *Method* error: the frame against exact normals of every pixel with the same model.\n"
         "- *Total* error: the frame against the exact frame, Phong shading as on a GPU. The exact frame has "
         "exact normals at every pixel and Blinn's model. For `phong`, which does not approximate Blinn's "
-        "model, it has the model (R·V)^n.\n\n"
+        "model, the exact frame has the model (R·V)^n.\n\n"
         "Methods of the documents have points with their operand N.H, and with the more exact operand "
         "1 - N.H. If the published variant differs, it has points, too. FLIP and CIEDE2000 measure the "
         "difference that an eye sees, of frames encoded as sRGB. A frame is *identical to the eye* if its "

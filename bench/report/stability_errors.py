@@ -69,7 +69,7 @@ _STEP = COMPONENT.step
 # Degrees by which rounding makes a span wider.
 _SLACK = 1e-3
 
-# Error in LSB by the rounding of three colour operands: ambient, diffuse and specular.
+# Error in LSB that comes from the rounding of three colour operands: ambient, diffuse and specular.
 _COLOR_ERROR = 3 * Intensity.COLOR_FORMAT.step / 2
 
 
@@ -91,7 +91,7 @@ def _design(case: Case, method: str) -> ShadingPipeline:
 
 
 def spans_of(case: Case, design: ShadingPipeline, raster: Raster) -> Spans:
-    """Spans of a case for a design, made by `spans_for`, or from the codes of the case if it has codes."""
+    """Spans of a case for a design. They have the codes of the case. Without codes `spans_for` makes them."""
     if case.codes is None:
         return spans_for(case.scene, raster, design)
     return design.interpolator.filled(_OfCodes(case, design, raster))
@@ -110,7 +110,7 @@ class _OfCodes:
         return Spans(raster.x, raster.y, raster.length, *self.case.codes)
 
     def with_lines(self) -> Spans:
-        # Both formats give the same numbers.
+        # The shifted codes stand for the same numbers in the format of the ends.
         shift = self.design.interpolator.END_FORMAT.fraction_bits - COMPONENT.fraction_bits
         left, right = self.case.codes
         return replace(self.with_normals(), normal_left=left << shift, normal_right=right << shift)

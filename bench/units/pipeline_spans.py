@@ -325,8 +325,8 @@ def spans_near_terminator(rng: np.random.Generator, largest: float, code: np.nda
 def spans_at_rounding(rng: np.random.Generator, largest: float, light: np.ndarray) -> Spans:
     """Spans along the terminator whose 1 - cosine depends on last bits.
 
-    For some spans 1 - cosine is at the border of its rounding. For the others it is at a border where the
-    number of segments of bisection changes.
+    For some spans 1 - cosine is at the border of its rounding. For the other spans 1 - cosine
+    is at a border where the number of segments of bisection changes.
     """
     normaliser = AdaptiveNormaliser()
     across = normalise(np.cross(light, rng.normal(size=3)))

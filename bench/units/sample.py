@@ -19,7 +19,7 @@ class Sample:
     exact : array, same shape
         The exact function of the same operands in float64.
     formula : array, same shape, optional
-        The unit's approximate formula in float64. ``None`` if its tables cannot be separated from its
+        The unit's approximate formula in float64. ``None`` if the unit's tables cannot be separated from its
         arithmetic.
     at : array, broadcast to the same shape, optional
         The operand on the axis of a drawing of errors. The record's ``axis`` names this operand.

@@ -224,7 +224,8 @@ def _turn_view(values: dict[str, Any], given: Collection[str]) -> None:
     """Replace a word for the view by vectors, and turn the default view with another ``up``.
 
     The front of a mesh is along z, or along -y if ``up`` is z. Right is the cross product of up and front.
-    Seen from the top, the front is at the bottom of the picture; seen from the bottom, at its top.
+    Seen from the top, the front is at the bottom of the picture. Seen from the bottom, the front is at the
+    top of the picture.
     """
     view, up = values["view"], np.array(values["up"], dtype=np.float64)
     if not isinstance(view, str) and ("view" in given or "up" not in given):

@@ -45,7 +45,7 @@ def header_of(unit: ShadingUnit, by_triangles: bool = False) -> list[str]:
     unit : ShadingUnit
         The pipelines.
     by_triangles : bool
-        Whether hardware geometry makes their spans, whose attributes are not described.
+        Whether hardware geometry makes the spans. The attributes of spans are then not described.
     """
     model = unit.model
     several = model if isinstance(model, PixelPipelines) else None
@@ -96,8 +96,8 @@ def _surface_lines(geometry: GeometryUnit) -> list[str]:
     return [
         "The albedo of a pixel multiplies its ambient and diffuse light; emission is added.",
         f"i_surface_*, {ATTRIBUTE}: of each corner {'; '.join(names)};",
-        "each times s, then s: 1/W over the largest 1/W of the triangle, times 1 - 2^-10; without",
-        "perspective s is 1 - 2^-10",
+        "each of these numbers times s, and after them s; s is 1/W over the largest 1/W of the triangle,",
+        "times 1 - 2^-10; without perspective s is 1 - 2^-10",
     ]
 
 

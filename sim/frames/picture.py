@@ -155,8 +155,8 @@ def write_comparison(
     total_width = max(3 * column + 4 * text, int(0.65 * 1.3 * text * max(len(title), len(subtitle))))
     left = [(total_width - 3 * column - 2 * text) // 2 + k * (column + text) for k in range(3)]
     above, below = 7 * text, 5 * text
-    # The figure has the texts above and below the panels. The panels are copied between them unchanged. At 72
-    # dots an inch, a point is a pixel. Half a pixel is added, so that the size is not rounded down.
+    # The figure has the texts above and below the panels. The panels are copied between the texts unchanged.
+    # At 72 dots an inch, a point is a pixel. Half a pixel is added, so that the size is not rounded down.
     figure = Figure(figsize=((total_width + 0.5) / 72, (above + below + 0.5) / 72), dpi=72)
     canvas = FigureCanvasAgg(figure)
 

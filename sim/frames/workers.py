@@ -98,7 +98,7 @@ def _end_with_parent() -> None:
 
 def _begin(cache: str, begin: Callable[..., object] | None, arguments: tuple[Any, ...]) -> None:
     threading.Thread(target=_end_with_parent, daemon=True).start()
-    # The parent stops its workers. If it could not block the signal for them, they ignore the signal.
+    # The parent stops its workers. If it could not block the signal for them, the workers ignore it.
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     os.environ["BLYSK_CACHE"] = cache
     if begin is not None:

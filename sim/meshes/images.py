@@ -58,7 +58,8 @@ def load_texture(
         See `Texture`. The texels that a resampled border needs follow from ``wrap``. An image for ``nearest``
         is enlarged without mixing the colours of neighbours.
     alpha : bool
-        Whether alpha is read. If not, it is recorded. It is linear, and resampled as a colour is.
+        Whether alpha is read. If not, it is recorded as not read. Alpha is linear. It is resampled like a
+        colour.
 
     Raises
     ------
@@ -183,7 +184,7 @@ def _resampled(
 ) -> np.ndarray:
     """A channel of codes, resampled in linear light. If sizes have a whole ratio, texels become means."""
     old = channel.shape[::-1]
-    # Twice as many texels as a filter reaches beyond the border.
+    # The margin has twice as many texels as a filter reaches beyond the border.
     pad = [2 + 2 * -(-before // after) for before, after in zip(old, size, strict=True)]
     for axis, count, mode in zip((1, 0), pad, wrap, strict=True):
         counts = [(0, 0), (0, 0)]

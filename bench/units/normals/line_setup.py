@@ -19,7 +19,7 @@ _FORMAT = LineSetup.VECTOR_FORMAT
 def any_lines(rng: np.random.Generator, count: int) -> tuple[np.ndarray, np.ndarray]:
     """Codes of the vectors at both ends of lines. Every eighth line has any codes.
 
-    The others have any angle, and vectors of length 1/100 to 1.
+    The other lines have any angle, and vectors of length 1/100 to 1.
     """
     ends = [sphere(rng, count) * 10.0 ** -rng.uniform(0, 2, (count, 1)) for _ in range(2)]
     left, right = quantise_line(*ends)

@@ -94,7 +94,7 @@ def test_section():
     assert f"{len(made.parts[0].rows) + 8 - 2} of" in made.text[1]
     table, drawing = made.parts
     assert [grades[4] for grades in table.grades[:4]] == ["bad", "bad", "bad", "good"]
-    assert table.records()[0]["largest error there, LSB"] is None
+    assert table.records()[0]["largest error at a border, LSB"] is None
     assert {row[-1] for row in table.rows} == {7}
     assert "<svg" in drawing.svg
 
