@@ -1,4 +1,4 @@
-"""A cache of compiled models and a folder of temporary files of each test's own."""
+"""A cache of compiled models and a folder of temporary files for each test."""
 
 import tempfile
 
@@ -9,7 +9,7 @@ from blysk.sim.engines.cache import private_folder
 
 @pytest.fixture
 def cache(tmp_path, monkeypatch):
-    """A folder that is not there yet, and the compilers of the machine."""
+    """A folder that does not exist yet, and the compilers of the machine."""
     folder = tmp_path / "cache"
     monkeypatch.setenv("BLYSK_CACHE", str(folder))
     monkeypatch.delenv("CXX", raising=False)

@@ -1,4 +1,4 @@
-"""What messages and guides tell the user to install: pip itself is asked whether it can."""
+"""Installations that messages and guides recommend: pip itself is asked whether they are possible."""
 
 import re
 import shlex

@@ -15,7 +15,7 @@ from blysk.sim.output import all_or_none, atomic_writer, check_writable, write_j
 
 @pytest.fixture
 def umask():
-    """Sets the umask of the process, and puts it back."""
+    """Set the umask of the process, and put it back."""
     before = os.umask(0o022)
     yield os.umask
     os.umask(before)
@@ -100,7 +100,7 @@ def test_unwritable_paths(tmp_path):
 
 @pytest.mark.parametrize("denied", ["folder", "file"])
 def test_permission_denied(tmp_path, monkeypatch, denied):
-    """The answer of the operating system is replaced, for a test that is run by root."""
+    """The answer of the operating system is replaced, because the test may be run by root."""
     path = tmp_path / "a"
     path.write_text("old")
     target = tmp_path if denied == "folder" else path
@@ -196,7 +196,7 @@ def test_all_or_none_with_a_name_that_was_taken(tmp_path):
 
 @pytest.mark.skipif(not Path("/proc/self").exists(), reason="no /proc")
 def test_folder_that_takes_no_files():
-    """To the superuser its permissions say that it does."""
+    """For the superuser its permissions allow files."""
     with pytest.raises(InputError, match=r"^/proc/a: cannot be written, .*; choose a(nother)? folder"):
         check_writable("/proc/a")
 

@@ -1,4 +1,4 @@
-"""What a run reads is never written, by whatever name and in whatever order."""
+"""A file that a run reads is never written, under whatever name and in whatever order."""
 
 import os
 
@@ -35,13 +35,13 @@ def test_every_name_of_a_file_in_both_orders(tmp_path):
             check_writable(tmp_path / "other")
             with pytest.raises(OutputIsInput) as caught:
                 reads(path)
-            # The error names the output, whatever was read.
+            # The error names the output, whatever file was read.
             assert caught.value.thing == str(name)
     assert path.read_text() == "kept"
 
 
 def test_a_file_that_is_read_while_it_is_written(tmp_path):
-    """The old one stays."""
+    """The old file stays."""
     path = tmp_path / "a"
     path.write_text("kept")
     with pytest.raises(OutputIsInput), RunFiles().active(), atomic_writer(path):

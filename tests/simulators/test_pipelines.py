@@ -1,6 +1,6 @@
 """Pipelines as Verilog, in Icarus Verilog and in Verilator, against the model, pixel by pixel, under stalls.
 
-In the long run one of both simulators draws a frame with each pipeline. In the quick run one simulator draws
+In the long run one of both simulators draws a frame with each pipeline. In the quick run one pipeline draws
 a small frame.
 """
 

@@ -27,7 +27,7 @@ SQUARE = "v 0 0 0 1 0 0\nv 1 0 0 0 1 0\nv 1 1 0 0 0 1\nv 0 1 0 1 1 1\nvt 0 0\nvt
 
 @pytest.fixture(autouse=True)
 def no_simulator(monkeypatch):
-    """Designs and scenes are looked at, and not simulated."""
+    """Designs and scenes are checked without a simulation."""
     monkeypatch.setattr(render, "_simulator", lambda *_: None)
 
 
@@ -52,7 +52,7 @@ def test_the_pipeline_has_the_albedo_of_the_mesh(tmp_path, texture, projection):
     albedo, (scene,) = ready.design.albedo, ready.scenes
     assert (albedo.colors, albedo.texture is not None) == (True, texture)
     assert (albedo.perspective, ready.loaded.ignored) == (projection == "perspective", ())
-    # Without a colour of the file, colours of vertices are on white.
+    # If the file has no diffuse colour, colours of vertices multiply white.
     assert scene.materials[0].diffuse == (1, 1, 1)
     error = compare(scene, ready.design, model_frame(scene, ready.design)).total_error
     assert error.max_lsb < 0.75
@@ -69,7 +69,7 @@ def test_a_mesh_of_the_interface_keeps_its_colours(tmp_path):
 
 
 def test_without_an_albedo_colours_are_told(tmp_path):
-    """Then a default stays in place of white, as if the file had no colours."""
+    """Without an albedo the file counts as having no colours, so the default colour replaces white."""
     path = square(tmp_path, texture=True)
     settings = read_settings(path, {}, SCENE)
     loaded = load(settings, albedo=False)
@@ -82,7 +82,7 @@ def test_without_an_albedo_colours_are_told(tmp_path):
 
 
 def holed(folder, behind=True):
-    """A plate with a checker of holes over its image, and perhaps a plate behind it."""
+    """A plate whose image has a checker of holes, and perhaps a plate behind it."""
     codes = np.zeros((4, 4, 4), np.uint8)
     codes[..., 0], codes[..., 3] = 255, 255 * (np.indices((4, 4)).sum(axis=0) % 2)
     image = io.BytesIO()
@@ -124,7 +124,7 @@ def holed(folder, behind=True):
 
 
 def test_holes_show_what_is_behind(tmp_path):
-    """The bit-accurate frame has the holes of the checker, found by its own texels alone."""
+    """The bit-accurate frame has the holes of the checker, which the test finds by its own texels."""
     options = {"size": (32, 24), "projection": "orthographic", "view": "front"}
     ready = prepared(holed(tmp_path), None, "pysim", options)
     (scene,) = ready.scenes
@@ -140,7 +140,7 @@ def test_holes_show_what_is_behind(tmp_path):
     assert frame.raster.dropped == (seen & ~solid).sum() > 100
     assert compare(scene, ready.design, frame).total_error.max_lsb < 0.75
 
-    # Alone, it covers nothing of the background in its holes.
+    # A single plate lets the background show through its holes.
     (alone,) = prepared(holed(tmp_path, behind=False), None, "pysim", options).scenes
     assert (render_of(alone).mask == solid).all()
 

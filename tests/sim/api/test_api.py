@@ -71,7 +71,10 @@ def test_every_option_has_a_type_for_checkers():
 
 
 def test_options_of_a_build_are_its_fields():
-    """With the same defaults; of a core ``None`` is what the geometry says, of the coarse test a size."""
+    """Options have the same defaults as the fields.
+
+    For a core ``None`` means the geometry's default, and the coarse test is a size.
+    """
     fields = {field.name: field.default for field in dataclasses.fields(Build)}
     assert fields.keys() - BUILD.keys() - DESIGN.keys() == {"exponent", "geometry_style"}
     for name, option in (BUILD | DESIGN).items():
@@ -143,7 +146,7 @@ def test_design_and_verilog(capsys):
 
 @pytest.mark.long
 def test_scene_files_scenes_and_meshes(tmp_path):
-    """One picture from a scene file, its scene, and its mesh with the same options."""
+    """A scene file, its scene, and its mesh with the same options give the same picture."""
     path = tmp_path / "a.toml"
     path.write_text(
         "size = [16, 12]\nbackground = 1\n[mesh]\nfile = 'teapot'\ntriangles = 100\n"
@@ -162,7 +165,7 @@ def test_scene_files_scenes_and_meshes(tmp_path):
     ):
         np.testing.assert_array_equal(other.image, of_file.image)
         assert other.cycles == of_file.cycles
-    # A view takes the place of the file's position, and None is none.
+    # A view replaces the file's position. The view None does not.
     plain = {"background": 1, "exponent": 9, "view": (1, 1, 0)}
     seen = blysk.scene(path, view=(1, 1, 0), position=None)
     assert seen.camera == blysk.scene(mesh, size=(16, 12), **plain).camera != scene.camera
@@ -187,7 +190,7 @@ def test_waveforms(tmp_path):
 
 @pytest.mark.long
 def test_without_a_compiler(monkeypatch, uninstalled):
-    """pysim, with a warning and a smaller picture; a scene that is given keeps its size."""
+    """Without a compiler pysim draws a smaller picture, with a warning. A given scene keeps its size."""
     monkeypatch.setenv("PATH", "")
     monkeypatch.delenv("CXX", raising=False)
     uninstalled("ziglang")
@@ -204,7 +207,7 @@ def test_without_a_compiler(monkeypatch, uninstalled):
 
 @pytest.mark.long
 def test_several_pipelines_give_the_same_picture():
-    """In fewer cycles; and the figures say how many they are."""
+    """Several pipelines take fewer cycles, and the figures name their number."""
     options = {"size": (64, 48), "triangles": 400}
     one, two = (blysk.render("teapot", pipes=pipes, **options) for pipes in (1, 2))
     np.testing.assert_array_equal(two.image, one.image)

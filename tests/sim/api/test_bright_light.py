@@ -1,4 +1,4 @@
-"""Errors of bright light: in proportion to the largest channel of all terms together."""
+"""Errors of bright light are in proportion to the largest channel of all terms together."""
 
 import pytest
 
@@ -15,10 +15,10 @@ LIGHTS = ((-0.5, 0.8, 0.7), (0.9, 0.2, 0.5))
 @pytest.mark.parametrize("color", [1, 8, *(pytest.param(k, marks=pytest.mark.long) for k in range(2, 8))])
 @pytest.mark.parametrize("method", ["chord-local", "renormalise"])
 def test_errors_are_in_proportion(method, color):
-    """Of one light and of two, diffuse and shining surfaces, at exponents that are cut much and little.
+    """One light and two, diffuse and shining surfaces, and exponents with many and few cuts.
 
-    A dim material under a bright light and a bright one under a dim light are the same: what counts is the
-    product. So this goes to a brightness of 8, the most that a term may have.
+    A dim material under a bright light equals a bright material under a dim light, because only the product
+    counts. So the brightness goes to 8, the largest of a term.
     """
     for exponent, diffuse, number in ((1, 0.4, 1), (20, 0.2, 2), (200, 0.0, 1)):
         share = color / number
@@ -43,7 +43,7 @@ def test_errors_are_in_proportion(method, color):
 @pytest.mark.ci
 @pytest.mark.long
 def test_a_light_that_is_off_is_not_built():
-    """It takes no hardware and asks for no method, wherever it is."""
+    """A light that is off takes no hardware and needs no method, wherever it is."""
     key = Light((-0.5, 0.8, 0.7))
     off = [Light((0, 0, 1), (0, 0, 0)), Light(position=(1, 2, 3), color=(0, 0, 0))]
     settings = rendering_settings("teapot", {"lights": [key, *off], "size": (16, 12), "triangles": 220})

@@ -51,7 +51,7 @@ def test_documents_have_every_register(unit):
 
 
 def test_documents_state_the_frame_of_vectors(unit):
-    """Where a method takes vectors, beside the field that holds them; else nowhere."""
+    """If a method takes vectors, the documents state their frame beside the field; otherwise they do not."""
     of_packets = {"span": "int32_t start[", "run": "int32_t normal["}
     field = of_packets.get(unit.framing.packets)
     for suffix in (".md", ".h"):
@@ -63,7 +63,7 @@ def test_documents_state_the_frame_of_vectors(unit):
 
 @pytest.mark.skipif(which("c++") is None, reason="there is no C++ compiler")
 def test_header_is_c(unit, tmp_path):
-    """A compiler agrees about every size and offset."""
+    """A compiler confirms every size and offset."""
     (tmp_path / "core.h").write_text(documents_of(unit, "core")[".h"])
     layouts = unit.framing.model
     lines = ['#include "core.h"', "#include <cstddef>"]

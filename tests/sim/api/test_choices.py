@@ -1,4 +1,4 @@
-"""Every value that an option offers is taken in some combination with the others."""
+"""Every value that an option offers is accepted in some combination with the others."""
 
 import itertools
 
@@ -19,7 +19,7 @@ from blysk.sim.value_types import Choice, Few, Truth
 
 
 def offered(option):
-    """Values that an option's help lists; of a range and of free forms none."""
+    """The values that an option's help lists; none for a range and for free forms."""
     kind = option.kind
     if isinstance(kind, Choice):
         return kind.names
@@ -29,7 +29,7 @@ def offered(option):
 
 
 def accepted(settings):
-    """Whether a rendering is prepared up to the model; refusals come before it."""
+    """Whether a rendering can be prepared up to the model. Refusals come earlier."""
     try:
         read = rendering.rendering_settings("teapot", {"size": (16, 12), "triangles": 220, **settings})
         rendering._built(read, rendering._design(read))
@@ -39,7 +39,7 @@ def accepted(settings):
 
 
 def test_options_of_a_rendering_replace_the_core_of_its_design():
-    """A design that drew a frame by hardware geometry may draw another from spans."""
+    """A design that drew a frame by hardware geometry can draw another frame from spans."""
     design = blysk.design(style="compact")
     read = rendering.rendering_settings("teapot", {"geometry": "hardware", "coarse": True, "setups": 2})
     by_triangles = rendering._built(read, design)
@@ -56,7 +56,7 @@ def test_no_choice_of_a_rendering_is_always_refused():
     crossed = ("method", "model", "gate", "geometry", "style")
     for values in itertools.product(*(choices[name] for name in crossed)):
         settings = dict(zip(crossed, values, strict=True))
-        # A pair that is taken once needs no further try.
+        # A pair that was accepted once is not tried again.
         pairs = set(itertools.combinations(settings.items(), 2))
         if not pairs <= taken and accepted(settings):
             taken |= pairs
@@ -81,7 +81,7 @@ def test_phong_is_refused_with_the_model_that_is_near_it(method):
         match=r"^model phong: .* finds N\.H, not R\.V; use method quotient; or phong_coplanar, .* 11 LSB",
     ):
         blysk.design(model="phong", method=method)
-    # The figure of that line: exact against exact, the default scene.
+    # This line has the figure of the default scene, exact against exact.
     scene = blysk.scene("teapot")
     raster = rasterise(scene)
     pair = (render(scene, "phong", model, raster).image for model in (PHONG, COPLANAR_PHONG))

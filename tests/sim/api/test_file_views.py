@@ -35,13 +35,13 @@ UNIT = "the unit of the lights' brightness"
 def test_scene_has_the_views_of_its_file(file):
     with pytest.warns(RuntimeWarning, match=UNIT):
         scene = blysk.scene(file)
-    # The scene's unit is 128 of the file's.
+    # A unit of the scene is 128 units of the file.
     assert np.allclose(scene.camera.position, np.array([48, 48, 200]) / 128)
     assert np.allclose(scene.camera.target, np.array([48, 48, 0]) / 128)
     assert scene.camera.field_of_view == pytest.approx(50)
     point, sun = scene.lights
     assert np.allclose(point.position, (0.375, 0.375, 0.5))
-    # The corners are 93.3 units away: 1e4 candela give 1.149 lux there.
+    # The corners are 93.3 units away, where 1e4 candela give 1.149 lux.
     assert np.allclose(point.attenuation, (0, 0, 128**2 / 8704))
     assert np.allclose(point.color, 1)
     assert np.allclose(sun.color, (8704 / 1e4, 0, 0))
@@ -72,7 +72,7 @@ def test_options_of_lights_replace_the_file_s(file, options):
 
 @pytest.mark.parametrize("place", [[48, 48, -9], [500, 48, 200], [48, 48, 0.5]])
 def test_cameras_that_see_nothing_are_told(tmp_path, place):
-    """Behind the square, beside it, and with the square before the near plane."""
+    """The camera is behind the square, beside it, or has the square in front of the near plane."""
     nodes = [{"mesh": 0}, {"camera": 0, "translation": place}]
     document, buffer = mesh_gltf(SQUARE, (0, 1, 2, 2, 1, 3), None, nodes)
     document["scenes"][0]["nodes"] = [0, 1]

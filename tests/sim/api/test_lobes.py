@@ -21,7 +21,7 @@ SMALL = {"size": (48, 36), "triangles": 300}
 
 
 def many(count):
-    """A scene of as many materials, each with a roughness of its own."""
+    """A scene with ``count`` materials, each with its own roughness."""
     scene = blysk.scene("teapot", **SMALL)
     (material,) = scene.materials
     mesh = replace(scene.mesh, material=np.arange(len(scene.mesh.faces)) % count)
@@ -31,7 +31,7 @@ def many(count):
 
 @pytest.mark.parametrize(("roughness", "sharp"), [(0.05, 1), (0.1, 0), (1.0, 0)])
 def test_lobes_that_are_too_sharp_are_counted(roughness, sharp):
-    """By the error of the lines between entries; other methods have finer tables at the peak."""
+    """The error of the lines between entries counts. Other methods have finer tables at the peak."""
     scene = blysk.scene("teapot", roughness=roughness, **SMALL)
     assert sharp_lobes(scene, preset(model="ggx")) == sharp
     assert (
@@ -98,7 +98,7 @@ def test_bad_input(options, message):
     ],
 )
 def test_bad_csv(tmp_path, monkeypatch, text, reason):
-    """One line with the reason, and what to give: nothing of other models."""
+    """One line has the reason and a remedy, and nothing about other models."""
     monkeypatch.chdir(tmp_path)
     Path("a.csv").write_text(text)
     with pytest.raises(InputError) as caught:

@@ -1,4 +1,4 @@
-"""Python takes the text of the command line and the natural value; its refusals name both."""
+"""Python takes the text of the command line and Python values; its refusals name both."""
 
 import inspect
 import re
@@ -112,7 +112,7 @@ def test_meshes_of_arrays_and_of_trimesh_are_those_of_a_file(tmp_path):
     same(given_mesh((box.vertices, box.faces)).mesh, expected)
     same(given_mesh((expected.vertices.tolist(), expected.faces, expected.normals)).mesh, expected)
     same(blysk.Mesh(V, F, [[0, 0, 1]] * 3), blysk.Mesh(*map(np.array, (V, F, [[0.0, 0, 1]] * 3))))
-    # Flaws are mended and counted as those of a file.
+    # Flaws are repaired and counted as those of a file.
     assert given_mesh((V, [*F, [0, 0, 1]], np.zeros((3, 3)))).repaired_normals == 3
 
 
@@ -123,7 +123,7 @@ def test_a_frame_of_arrays():
     assert frame.error_map.max() == pytest.approx(frame.error.max_lsb)
     exact = 255 * frame.comparison.golden
     np.testing.assert_array_equal(frame.error_map, np.abs(frame.image - exact).max(axis=2))
-    # The default model is a table of its own: no error of the model besides.
+    # The default model comes from a table, so the model adds no error.
     assert frame.total_error == frame.error
 
 
@@ -238,10 +238,10 @@ def test_a_design_has_its_cost():
     assert (cost.latency, cost.cycles_per_pixel) == (unit.latency, unit.cycles_per_pixel)
     (entry,) = (e for e in read_store() if e["design"] == "pipeline renormalise, blinn, 1 light")
     assert (cost.luts, cost.flip_flops, cost.device) == (entry["luts"], entry["flip_flops"], entry["device"])
-    # The mapper makes each of these one multiplier of 18x18 bits.
+    # The mapper makes a multiplier of 18x18 bits of each of these.
     assert cost.multipliers == sum(cost.multiplier_widths.values()) == entry["multipliers"]
     assert f"{entry['luts']:,} LUT" in str(cost)
-    # No figure of another design: neither more lights nor another build is that which was placed.
+    # There are no figures of another design. A design with more lights, or another build, was not placed.
     for other in (replace(design, lights=2), design.built(setup_interval=3), replace(design, grey=True)):
         assert isinstance(other, blysk.Design)
         assert other.placed() == {}

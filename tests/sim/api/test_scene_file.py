@@ -1,4 +1,4 @@
-"""Scene files: what they say, and every way to say it wrong."""
+"""Scene files: their contents, and every kind of mistake in them."""
 
 import os
 import re
@@ -67,7 +67,7 @@ def test_documented_example(write):
 
 
 def test_documented_example_has_every_key(write):
-    """That of an option that is left out stands in a comment; in [pipeline] with its default."""
+    """An option that is left out stands in a comment, with its default if it is in [pipeline]."""
     parts = re.split(r"^\[+(\w+)\]+.*$", EXAMPLE, flags=re.M)
     sections = dict(zip(["", *parts[1::2]], parts[::2], strict=True))
     for option in (SCENE | DESIGN | RENDERING).values():
@@ -126,7 +126,7 @@ def test_values_are_those_of_their_text(write):
 
 
 def test_point_lights(write):
-    """Beside the others, in their order; the origin is a position, too."""
+    """Point lights stand beside other lights, in their order. A position may be the origin."""
     text = """
     [camera]
     viewer = "near"
@@ -304,7 +304,8 @@ ODD = [
 @settings(max_examples=100, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(data=st.data())
 def test_mutated_files_are_read_or_refused_in_one_line(write, data):
-    """The documented file with pieces replaced, left out or put in, and bytes changed: never a traceback."""
+    """The documented file with pieces replaced, left out or inserted, and bytes changed, never gives a
+    traceback."""
     pieces = re.split(r"([A-Za-z_]+|[0-9.]+|[^\w\s])", EXAMPLE)
     for _ in range(data.draw(st.integers(1, 4))):
         place = data.draw(st.integers(0, len(pieces) - 1))
@@ -364,7 +365,7 @@ VALUES = {
 
 
 def toml(value):
-    """A value as TOML has it; of a float, every bit."""
+    """A value as TOML has it, with every bit of a float."""
     if isinstance(value, tuple):
         return f"[{', '.join(map(toml, value))}]"
     return str(value).lower() if isinstance(value, bool) else repr(value)
@@ -373,7 +374,7 @@ def toml(value):
 @settings(max_examples=100, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(values=st.fixed_dictionaries({}, optional=VALUES), lights=st.none() | LIGHTS)
 def test_what_is_written_is_read(write, values, lights):
-    """Every key with any value of its range, to the bit, and nothing else."""
+    """Every key with any value of its range is read as it was written, to the bit."""
     lines = ["mesh.file = 'teapot'", *(f"{key} = {toml(value)}" for key, value in values.items())]
     expected = {"mesh": "teapot"} | {key.split(".")[-1]: value for key, value in values.items()}
     if lights is not None:

@@ -12,12 +12,12 @@ OPTIONS = {"size": (24, 18), "triangles": 100, "engine": "pysim"}
 
 @pytest.fixture(scope="module")
 def frames():
-    """The same scene in both transfers."""
+    """The same scene with both transfers."""
     return {of: blysk.render("teapot", transfer=of, **OPTIONS) for of in ("linear", "srgb")}
 
 
 def test_pictures_of_one_scene(frames):
-    """A code of sRGB stands for the light of the linear code, give or take its rounding."""
+    """A code of sRGB stands for the light of the linear code, up to its rounding."""
     linear, srgb = (frames[of].image.astype(int) for of in ("linear", "srgb"))
     surface = (linear != linear[0, 0]).any(axis=-1)
     low, high = (255 * encode((linear + half) / 255) for half in (-0.51, 0.51))

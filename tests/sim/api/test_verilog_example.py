@@ -1,4 +1,4 @@
-"""The worked example of a Verilog header, read as an engineer would, against the frame's own constants."""
+"""The worked example of a Verilog header, as an engineer would read it, against the frame's own constants."""
 
 import re
 from dataclasses import replace
@@ -26,7 +26,7 @@ def writes_in(lines):
 
 @pytest.mark.parametrize("materials", [1, 3])
 def test_values_follow_from_the_text(materials):
-    """Colours are 255 times the coefficient in UQ(11, 6); a table's words follow from u."""
+    """Colours are 255 times the coefficient in UQ(11, 6). A table's words follow from u."""
     lines = example_of(preset("renormalise", "blinn", 2, materials=materials))
     found = writes_in(line for line in lines if line.startswith("  ") and "entry" not in line)
     assert found[0] == EXPONENT
@@ -41,7 +41,10 @@ def test_values_follow_from_the_text(materials):
 
 @pytest.mark.parametrize("model", ["blinn", "phong"])
 def test_table_of_quotients_follows_from_the_text(model):
-    """By s = 1 - (N.H)^2, then by (N.H)^2; or by (1 - R.V)/2 alone. L is that of the light's frame."""
+    """The table is read by s = 1 - (N.H)^2, and by (N.H)^2; or by (1 - R.V)/2 alone.
+
+    L is in the frame of the light.
+    """
     design = preset("quotient", model)
     lines = example_of(design)
     found = writes_in(line for line in lines if line.startswith("  ") and "entry" not in line)
@@ -59,7 +62,7 @@ def test_table_of_quotients_follows_from_the_text(model):
 
 
 def test_vectors_are_said_to_be_what_is_read():
-    """The half-way vector is read by no method of vectors or values, and L is in its own frame."""
+    """No method of vectors or values reads the half-way vector, and L is in its own frame."""
     for method, direction, halfway in (
         ("linear", "unit vector to the light", "unit half-way vector"),
         ("quotient", "sin a, 0, cos a of the light's frame", "not read"),
@@ -82,7 +85,7 @@ def test_no_example_of_a_table_that_is_fixed_for_another_exponent():
 
 @pytest.mark.parametrize("method", ["linear", "renormalise"])
 def test_normals_are_described_as_they_are(method):
-    """The ends of a true line are no unit vectors, and no port of theirs is said to have one."""
+    """The ends of a true line are no unit vectors, and the text of their ports does not say so."""
     unit = ShadingPipelineUnit(preset(method, "cosquad"))
     (line,) = (line for line in header_of(unit) if line.startswith("i_normal_*"))
     texts = [text for port, text in descriptions_of(unit).items() if port.startswith("i_normal")]
@@ -104,7 +107,7 @@ def test_header_has_an_instance_of_every_port():
 
 @pytest.mark.long
 def test_every_attribute_is_described():
-    """With textures inside; other memories have ports of their own."""
+    """Textures are inside. Other memories have ports of their own."""
     design = blysk.design(method="linear", model="cosquad")
     for external in (False, True):
         texture = TextureSampler(TexelMemory(8, external))

@@ -1,4 +1,5 @@
-"""Words for the view and the upright: a cube with a mark on one side, drawn from where the word says."""
+"""Words for the view and the upright: a cube with a mark on one side, seen from the side that the word
+names."""
 
 import numpy as np
 import pytest
@@ -9,7 +10,7 @@ from blysk.sim.api.options import SCENE
 from blysk.sim.api.settings import read_settings
 from blysk.sim.errors import OptionError
 
-# The viewer's direction, and what is upright in the picture.
+# The direction to the viewer, and the direction that is up in the picture.
 VIEWS = {
     ("y", "front"): ((0, 0, 1), (0, 1, 0)),
     ("y", "back"): ((0, 0, -1), (0, 1, 0)),
@@ -43,7 +44,7 @@ def test_words_are_those_of_their_vectors():
 
 
 def test_default_view_turns_with_the_upright():
-    """A mesh whose upright is z, and the same turned so that it is y, give one picture."""
+    """A mesh with z up, and the same mesh turned so that y is up, give the same picture."""
     rng = np.random.default_rng(3)
     vertices = rng.normal(size=(12, 3))
     normals = np.tile([0.0, 0.0, 1.0], (12, 1))
@@ -72,7 +73,7 @@ def test_scene_file(tmp_path):
     path = tmp_path / "a.toml"
     path.write_text('mesh.file = "teapot"\nmesh.triangles = 64\ncamera.view = "top"\ncamera.up = "z"\n')
     assert scene(str(path)).camera == scene("teapot", triangles=64, view="top", up="z").camera
-    # An option goes before the file's.
+    # An option replaces the file's value.
     assert scene(str(path), view="left").camera == scene("teapot", triangles=64, view="left", up="z").camera
 
 

@@ -1,4 +1,4 @@
-"""What tests of the command line share."""
+"""Helpers of the tests of the command line."""
 
 import sys
 import time
@@ -20,7 +20,7 @@ DEFAULTS = {
     "lights": [Light((-0.5, 0.8, 0.7))],
     "background": "#1a1c20",
 }
-"""Of a scene that nothing is said of."""
+"""The size of a scene for which no size is given."""
 
 ERROR_NAMES = ["max_lsb", "p999_lsb", "rmse_lsb", "psnr_db", "steady_lsb", "border_lsb"]
 
@@ -35,7 +35,7 @@ def files():
 
 
 def wait(process, happens, seconds=120):
-    """Until something happens while a process runs."""
+    """Wait until something happens while a process runs."""
     deadline = time.monotonic() + seconds
     while not happens():
         assert process.poll() is None, process.communicate()

@@ -1,4 +1,4 @@
-"""A folder for each test of the command line, and bad input in one line."""
+"""A folder for each test of the command line, and checks of bad input."""
 
 import re
 
@@ -11,7 +11,7 @@ from .commandline import files
 
 @pytest.fixture
 def folder(tmp_path, monkeypatch):
-    """Each test runs in a folder of its own, with the compilers of the machine."""
+    """Each test runs in its own folder, with the compilers of the machine."""
     monkeypatch.delenv("CXX", raising=False)
     monkeypatch.chdir(tmp_path)
     return tmp_path
@@ -19,7 +19,7 @@ def folder(tmp_path, monkeypatch):
 
 @pytest.fixture
 def refused(capsys):
-    """Run with bad input: one line of thing, reason and remedy, status 2, and no file touched."""
+    """Run with bad input: one line has thing, reason and remedy, the status is 2, and no file is changed."""
 
     def refused(*arguments, thing, says=""):
         before = files()

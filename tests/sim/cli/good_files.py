@@ -137,7 +137,7 @@ def data_gltf() -> dict[str, bytes]:
 
 
 def good_files() -> dict[str, dict[str, bytes]]:
-    """By kind, the files of a good mesh or scene, the one to be named first."""
+    """For each kind, the files of a good mesh or scene. The first is the file to name."""
     mesh = trimesh.Trimesh(_VERTICES, _FACES, vertex_normals=_VERTICES, process=False)
     stl = mesh.export(file_type="stl")
     return {

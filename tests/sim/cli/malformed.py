@@ -1,4 +1,4 @@
-"""Malformed meshes and scene files: good ones with damage, odd names, references, counts and nodes."""
+"""Malformed meshes and scene files: good files with damage, odd names, references, counts and nodes."""
 
 import json
 import os
@@ -84,7 +84,7 @@ def _overwritten(data: bytes, rng: random.Random) -> bytes:
 
 
 def _shifted(data: bytes, rng: random.Random) -> bytes:
-    """A piece left out, doubled or put in."""
+    """A piece is left out, doubled or inserted."""
     at, length = rng.randrange(len(data)), rng.choice([1, 3, 20, 200])
     return rng.choice(
         [
@@ -97,14 +97,14 @@ def _shifted(data: bytes, rng: random.Random) -> bytes:
 
 
 def _counted(data: bytes, rng: random.Random) -> bytes:
-    """A word of the binary part, a count perhaps, made huge."""
+    """A word of the binary part, perhaps a count, is made huge."""
     at = rng.choice([8, 12, 80, 4 * rng.randrange(max(1, len(data) // 4))])
     value = rng.choice([10**9, 2**31 - 1, 2**31, 2**32 - 1, 0, 1])
     return data[:at] + struct.pack("<I", value) + data[at + 4 :]
 
 
 def _unreal(data: bytes, rng: random.Random) -> bytes:
-    """A word made a float that is none, or huge."""
+    """A word is made a float that is NaN, infinite or huge."""
     at = len(data) % 4 + 4 * rng.randrange(max(1, len(data) // 4))
     return data[:at] + struct.pack("<f", rng.choice(_FLOATS)) + data[at + 4 :]
 
@@ -126,7 +126,7 @@ def _misspelt(data: bytes, rng: random.Random) -> bytes:
 
 
 def _reordered(data: bytes, rng: random.Random) -> bytes:
-    """Lines shuffled, left out, doubled."""
+    """Lines are shuffled, left out or doubled."""
     lines = data.split(b"\n")
     for _ in range(rng.choice([1, 1, 3])):
         at, other = rng.randrange(len(lines)), rng.randrange(len(lines))
@@ -173,7 +173,8 @@ def _at(value: Any, path: tuple) -> Any:
 
 
 def _mutated_document(document: dict, rng: random.Random) -> dict:
-    """A value of a document replaced by an odd one, or by another of it, or left out."""
+    """A value of a document is replaced by an odd value or by another value of the document, or is left
+    out."""
     document = json.loads(json.dumps(document))
     for _ in range(rng.choice([1, 1, 1, 2, 4])):
         *above, key = rng.choice([path for path in _paths(document) if path])
@@ -217,7 +218,7 @@ def _damaged_document(rng: random.Random) -> Case:
 
 
 def _outside(rng: random.Random) -> Case:
-    """A reference that leaves the folder; what it would find is good."""
+    """A reference leaves the folder. The file that it names outside is good."""
     name = rng.choice(
         split(
             "../secret.bin|sub/../../secret.bin|%2e%2e/secret.bin|..%2Fsecret.bin|link.bin|sub/link/secret.bin|"
@@ -234,19 +235,19 @@ def _outside(rng: random.Random) -> Case:
     else:
         files |= {**gltf(name), "link.bin": "../secret.bin"}
         files |= {"a.toml": SCENE.replace(b"a.stl", b"a.gltf")}
-    # A material file is told, and not read.
+    # A material file outside is reported, and not read.
     return Case(f"outside: {name}", ["render", main, *RENDER], files, must_fail=main != "a.obj")
 
 
 def _inside_but_odd(rng: random.Random) -> Case:
-    """References that stay inside, to what cannot be read as a file."""
+    """References stay inside, and name things that cannot be read as a file."""
     files = gltf(rng.choice(["folder", "pipe", "loop", "missing.bin", "", ".", "a.gltf", "\0", "x" * 300]))
     files |= {"folder": None, "pipe": os.mkfifo, "loop": "loop"}
     return Case("odd reference", ["render", "a.gltf", *RENDER], files, must_fail=True)
 
 
 def _nodes(rng: random.Random) -> Case:
-    """Nodes in a circle, in a long row, or doubled at every step."""
+    """Nodes form a circle or a long row, or double at every step."""
     kind = rng.choice(["self", "two", "long", "doubled", "circle below", "many roots", "shared"])
     document, buffer = document_of(None)
     row = rng.choice([30, 2000, 50_000])
@@ -260,7 +261,7 @@ def _nodes(rng: random.Random) -> Case:
         "shared": [{"children": [2, 1]}, {"children": [2]}, {"mesh": 0}],
     }[kind]
     if kind == "doubled" and rng.random() < 0.5:
-        # Two nodes a level, each the parent of both below.
+        # There are two nodes a level, and each is the parent of both nodes below.
         nodes = [{"children": [k + 2 - k % 2, k + 3 - k % 2]} for k in range(60)] + [{"mesh": 0}] * 2
     document["nodes"] = nodes
     if kind == "many roots":
@@ -271,7 +272,7 @@ def _nodes(rng: random.Random) -> Case:
 
 
 def _huge_header(rng: random.Random) -> Case:
-    """A header that promises a thousand million of something."""
+    """A header promises a thousand million of something."""
     count = rng.choice([10**9, 2**31 - 1, 2**31, 2**32 - 1, 10**12, 10**18, 2**63, 10**30])
     good, kind = good_files(), rng.choice(["ply", "ascii ply", "stl", "count", "length", "glb", "no view"])
     if kind in ("ply", "ascii ply"):
@@ -294,13 +295,13 @@ def _huge_header(rng: random.Random) -> Case:
             at = rng.choice([8, 12])
             data = data[:at] + struct.pack("<I", count % 2**32 or 10**9) + data[at + 4 :]
         files = {"a.glb": data}
-    # A view that is longer than the buffer may be cut to it, and hold what the accessor needs.
+    # A view that is longer than the buffer may be cut to the buffer, and still hold the accessor's data.
     must_fail = kind != "length"
     return Case(f"header: {kind} {count}", ["render", next(iter(files)), *RENDER], files, must_fail)
 
 
 def _long_text(rng: random.Random) -> Case:
-    """Little that is read over and over, or nested."""
+    """A little data is read over and over, or nested."""
     kind = rng.choice(["spaces", "corners", "tabs", "nested", "materials", "dots", "continued", "digits"])
     text = obj()
     texts = {
@@ -323,7 +324,7 @@ def _long_text(rng: random.Random) -> Case:
 
 
 def _odd_name(rng: random.Random) -> Case:
-    """A good file under an odd name."""
+    """A good file has an odd name."""
     stems = split(
         "зображення|🫖|a\u202eb|a\u0301|\udcff|-o|%41|{x}|$HOME|.|'|\"|\\|*|a;b|\x1b[31m|\x7f|CON|~"
     )
@@ -337,7 +338,7 @@ def _odd_name(rng: random.Random) -> Case:
 
 
 def _no_file(rng: random.Random) -> Case:
-    """Something else than a file."""
+    """The path is not a file."""
     name = "a" + rng.choice([".obj", ".stl", ".ply", ".glb", ".gltf", ".toml"])
     content = rng.choice([None, os.mkfifo, name, "missing", "/dev/zero", "/dev/null", "/proc/self/mem", b""])
     shown = "folder" if content is None else getattr(content, "__name__", content)
@@ -358,6 +359,6 @@ _KINDS = {
 
 
 def file_case(seed: int, index: int) -> Case:
-    """Number ``index`` of the malformed files."""
+    """The malformed file of number ``index``."""
     rng = random.Random(f"{seed} {index}")
     return rng.choices(list(_KINDS), list(_KINDS.values()))[0](rng)

@@ -1,4 +1,4 @@
-"""``--albedo``: ports of Verilog with colours of pixels, and what is refused."""
+"""``--albedo``: ports of Verilog with colours of pixels, and refusals."""
 
 import re
 from pathlib import Path
@@ -17,7 +17,7 @@ TRIANGLES = "--geometry", "hardware", "--albedo", "colors"
 @pytest.mark.long
 @pytest.mark.ci
 def test_verilog():
-    """The words are those of Python. Attributes of spans, and texels outside, have described ports."""
+    """Its words are those of Python. Attributes of spans, and texels outside, have described ports."""
     assert main(["verilog", *SMALL, "--albedo", "colors,nearest,outside", "-o", "core.v"]) == 0
     text = Path("core.v").read_text()
     design = blysk.design(method="linear", model="cosquad", albedo=["outside", "colors", "nearest"])

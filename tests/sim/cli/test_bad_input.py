@@ -1,4 +1,4 @@
-"""Malformed meshes and scenes, and bad values of every option: one line, and nothing left."""
+"""Malformed meshes and scenes, and bad values of every option: one line, and no files left."""
 
 import json
 import os
@@ -17,7 +17,7 @@ TOO_LONG = (-signal.SIGALRM, -signal.SIGXCPU, -signal.SIGKILL)
 
 
 def attempts(folder, seed, files, every):
-    """What came of the good files, of so many malformed ones, and of every so-many-th bad option."""
+    """Outcomes of the good files, of some malformed files, and of every so-many-th bad option."""
     program = Path(__file__).with_name("trial.py")
     numbers = [str(number) for number in (seed, files, every)]
     done = subprocess.run(
@@ -31,7 +31,7 @@ def attempts(folder, seed, files, every):
 
 
 def fault(row):
-    """What is wrong with an outcome, or ``None``."""
+    """The fault of an outcome, or ``None``."""
     if row["status"] == 0:
         if row["must_fail"]:
             return "it is accepted"
@@ -58,7 +58,7 @@ def fault(row):
 def check(rows):
     faults = [{"fault": fault(row), **row} for row in rows if fault(row)]
     assert not faults, f"{len(faults)} of {len(rows)}: {json.dumps(faults[:5], indent=1)}"
-    # Neither is everything refused, nor everything drawn.
+    # Some input is refused, and some is drawn.
     assert {row["status"] for row in rows if not row["must_fail"]} == {0, 2}
     assert all(row["status"] == 0 for row in rows if row["name"].startswith("good "))
 
@@ -68,7 +68,7 @@ def check(rows):
     ("files", "every", "least"), [pytest.param(250, 4, 500, marks=pytest.mark.ci), (20, 1, 900)]
 )
 def test_much_malformed_input(tmp_path, files, every, least):
-    """CI has the files, and every fourth bad option; then every option."""
+    """CI has the files and every fourth bad option. The long run has every option."""
     rows = attempts(tmp_path, seed=2026, files=files, every=every)
     assert len(rows) > least
     check(rows)

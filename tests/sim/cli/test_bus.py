@@ -1,4 +1,4 @@
-"""``--top`` and ``--bus``: Verilog of every core, what is written beside it, and what is refused."""
+"""``--top`` and ``--bus``: Verilog of every core, the files beside it, and refusals."""
 
 from pathlib import Path
 
@@ -12,7 +12,7 @@ SMALL = "--method", "linear", "--model", "cosquad"
 
 
 def test_files_of_a_core_on_a_bus():
-    """The header tells how to drive it; the map stands beside it in three forms."""
+    """The header tells how to drive the core. The map is beside it in three forms."""
     assert main(["verilog", *SMALL, "--bus", "wishbone", "-o", "core.v"]) == 0
     text = Path("core.v").read_text()
     for told in (
@@ -31,7 +31,7 @@ def test_files_of_a_core_on_a_bus():
 @pytest.mark.long
 @pytest.mark.parametrize("method", ["linear", "renormalise", pytest.param("quotient", marks=pytest.mark.ci)])
 def test_ports_of_geometry_alone(method):
-    """Its own ports, each with a description, and what the limit of spans is."""
+    """Its own ports have descriptions, and the text explains the limit of spans."""
     assert main(["verilog", "--top", "geometry", "--method", method, "-o", "core.v"]) == 0
     lines = Path("core.v").read_text().splitlines()
     start = lines.index(next(line for line in lines if line.startswith("// port ")))

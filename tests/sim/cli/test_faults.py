@@ -1,4 +1,4 @@
-"""What the machine does to a run: killed programs, full and forbidden disks, spoilt and foreign caches."""
+"""Faults of the machine: killed programs, full and forbidden disks, damaged and foreign caches."""
 
 import contextlib
 import errno
@@ -52,7 +52,7 @@ def small_disk(tmp_path):
 
 @contextlib.contextmanager
 def an_ordinary_user():
-    """The superuser, to whom nothing is forbidden, becomes somebody else for a while."""
+    """The superuser, to whom nothing is forbidden, becomes an ordinary user for a while."""
     if os.geteuid():
         yield
         return
@@ -67,7 +67,8 @@ def an_ordinary_user():
 
 
 def test_killed_while_compiling(cache, temporary, tmp_path):
-    """Of a process that is killed no half of a model is in the cache, and the next one builds it."""
+    """A process that is killed leaves no half of a model in the cache, and the next process builds the
+    model."""
     text = 'case "$1" in --version) echo 1.0; exit 0;; esac; echo $$ > "$STARTED"; exec sleep 60'
     started = tmp_path / "started"
     program = "print(simulate(Triple(), np.arange(5), count=5).beats.tolist())"
@@ -83,7 +84,7 @@ def test_killed_while_compiling(cache, temporary, tmp_path):
 
 
 def test_full_cache(small_disk, temporary, monkeypatch):
-    """The model is built and used all the same, by the first compiler; a warning says why it is not kept."""
+    """The first compiler still builds the model, and it is used. A warning tells why it is not kept."""
     before = left_in(small_disk)
     monkeypatch.setenv("BLYSK_CACHE", str(small_disk))
     warning = rf"^cache folder {re.escape(str(small_disk))} cannot be written \(No space left on device\): "
@@ -127,7 +128,7 @@ def test_full_temporary_folder(cache, small_disk, monkeypatch):
     ],
 )
 def test_model_of_another_machine(cache, at, value):
-    """A library with a true checksum that is for another kind of processor is built again."""
+    """A library with a right checksum, but for another kind of processor, is built again."""
     assert scaled() == THREE
     (entry,) = entries(cache)
     content = entry.read_bytes()
@@ -148,7 +149,7 @@ def test_model_of_another_machine(cache, at, value):
 
 @pytest.fixture
 def open_folder():
-    """A folder in which an ordinary user may look; those above it are open, too."""
+    """A folder that an ordinary user may read. The folders above it are open, too."""
     folder = Path(tempfile.mkdtemp())
     folder.chmod(0o755)
     yield folder
@@ -172,7 +173,7 @@ def test_forbidden_output(open_folder):
 
 @pytest.mark.parametrize("name", ["old.json", "new.json", "new.png"])
 def test_full_disk(small_disk, name):
-    """The old file is as it was, and of the new one there is nothing."""
+    """The old file is unchanged, and there is no part of the new file."""
     before = {path: path.read_bytes() for path in left_in(small_disk)}
     noise = np.random.default_rng(1).integers(0, 256, (60, 60, 3)).astype(np.uint8)
     write = write_image if name.endswith(".png") else write_json
@@ -188,12 +189,12 @@ LIMITED = "import resource, sys; resource.setrlimit(resource.RLIMIT_FSIZE, (4096
 
 @pytest.fixture
 def unmeasured(monkeypatch):
-    """Line coverage of a process would be in a file that is larger than it may write."""
+    """Line coverage is switched off, because its file would be larger than the process may write."""
     monkeypatch.delenv("COVERAGE_PROCESS_CONFIG", raising=False)
 
 
 def test_largest_file_of_a_process(unmeasured, tmp_path):
-    """A limit of the shell in place of a full disk."""
+    """A limit of the shell stands for a full disk."""
     program = "from blysk.sim.output import write_text; write_text(sys.argv[1], 5000 * 'x')"
     path = tmp_path / "a.txt"
     path.write_text("old")
@@ -207,7 +208,7 @@ def test_largest_file_of_a_process(unmeasured, tmp_path):
 
 
 def test_yosys_that_cannot_work(unmeasured, cache):
-    """What it runs in ends with a traceback, of which the last line tells."""
+    """Yosys ends with a traceback, and the message has its last line."""
     run = start(LIMITED + "simulate(Triple(), np.arange(5), count=5, engine='cxxrtl')")
     _, errors = run.communicate(timeout=60)
     assert re.search(r"\nblysk\.sim\.errors\.SimulationError: Yosys: \S.*File too large.*\n\Z", errors)
@@ -247,7 +248,10 @@ SWEEP += ["--largest-error", "255"]
 @pytest.mark.long
 @pytest.mark.skipif(not Path("/proc/self/task").exists(), reason="there is no /proc")
 def test_killed_worker_of_a_command(cache):
-    """One line, status 2; what was measured is kept, and the next run goes on from there."""
+    """The command prints one line and ends with status 2.
+
+    Measured values are kept, and the next run continues from there.
+    """
     arguments = [*PROGRAM, *SWEEP, "--jobs", "2"]
     process = subprocess.Popen(arguments, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
     wait(process, lambda: left_in(cache / "results"))
@@ -262,7 +266,7 @@ def test_killed_worker_of_a_command(cache):
     kept = {path: path.stat().st_mtime_ns for path in left_in(cache / "results")}
     assert kept
     done = subprocess.run(arguments, capture_output=True, text=True)
-    # On a busy machine it takes over 10 s, and tells of its progress.
+    # On a busy machine this takes over 10 s, and then prints its progress.
     lines = [line for line in done.stderr.splitlines() if "measurements]" not in line]
     assert (done.returncode, lines) == (0, [])
     assert "designs     6 of 6 have" in done.stdout

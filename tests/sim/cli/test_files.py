@@ -18,7 +18,7 @@ CORNERS = "v 0 0 0\nv 1 0 0\nv 0 1 0\n"
 
 @pytest.fixture
 def sources():
-    """A mesh with material files and textures, one of glTF with its buffer and image, a curve, a scene."""
+    """A mesh with material files and textures, a glTF mesh with its buffer and image, a curve, a scene."""
     Path("m.obj").write_text(f"mtllib m.mtl m.json.png\n{CORNERS}usemtl a\nf 1 2 3\n")
     Path("m.mtl").write_text("newmtl a\nKd 1 0 0\nmap_Kd -s 1 1 1 texture.png\n")
     Path("m.json.png").write_text("newmtl b\n")
@@ -50,7 +50,7 @@ def sources():
     ],
 )
 def test_render_replaces_nothing_that_it_reads(sources, mesh, read, capsys):
-    """By no output option; nor what the mesh names and the run leaves unread."""
+    """No output option replaces an input, or a file that the mesh names and the run does not read."""
     before = files()
     for name in read:
         options = ["--json", "--vcd"] + ["-o", "--compare"] * name.endswith(".png")
@@ -73,7 +73,7 @@ def test_no_command_replaces_a_curve(sources, capsys):
 
 
 def test_verilog_replaces_no_file_beside_it(capsys):
-    """Its own it does."""
+    """A file that blysk wrote is replaced."""
     small = ["verilog", "--method", "linear", "--model", "cosquad", "--bus", "wishbone", "-o"]
     for suffix in ("md", "svd"):
         path = Path(f"README.{suffix}")
@@ -98,7 +98,7 @@ def test_verilog_inside_the_folder_of_its_bench(capsys):
 
 @pytest.mark.parametrize("output", ["a.gif", "a.png"])
 def test_turntable_replaces_no_file_beside_it(output, capsys):
-    """Its own frames it does, and what the user names."""
+    """Frames that blysk wrote are replaced, and files that the user names."""
     turntable = ["render", "teapot", "--triangles", "100", "--size", "16x12", "--engine", "pysim"]
     turntable += ["--method", "linear", "--frames", "1", "--jobs", "1", "-o", output]
     for name in ("a-0001.png", "a.gif"):

@@ -21,7 +21,10 @@ HARDWARE = "--geometry", "hardware"
 @pytest.mark.long
 @pytest.mark.ci
 def test_picture_and_figures(capsys):
-    """The model's picture; errors against exact normals of every pixel; counters and cycles."""
+    """The picture equals the model's.
+
+    The figures have errors against exact normals of every pixel, counters and cycles.
+    """
     assert main(["render", *SMALL, *HARDWARE, "-v", "-o", "a.png", "--json", "a.json"]) == 0
     figures = json.loads(Path("a.json").read_text())
     drawn = blysk.scene("teapot", triangles=500, size=(64, 48))
@@ -43,7 +46,7 @@ def test_picture_and_figures(capsys):
 
 @pytest.mark.long
 def test_coarse_depth_test():
-    """The same picture, of fewer pixels that were shaded."""
+    """The picture is the same, and fewer pixels are shaded."""
     found = {}
     for name, options in {"plain": [], "coarse": ["--coarse"]}.items():
         arguments = [*SMALL, *HARDWARE, *options, "-o", f"{name}.png", "--json", f"{name}.json"]
@@ -53,14 +56,14 @@ def test_coarse_depth_test():
     plain, coarse = found["plain"], found["coarse"]
     assert coarse["pixels"] + coarse["counts"]["dropped_pixels"] == plain["pixels"]
     assert coarse["counts"]["dropped_pixels"] > 0.05 * plain["pixels"]
-    # In a picture as small as this the triangles' setup takes the time.
+    # In such a small picture the triangles' setup takes most of the time.
     assert coarse["cycles"] < 1.01 * plain["cycles"]
 
 
 @pytest.mark.ci
 @pytest.mark.long
 def test_coarse_depth_test_in_verilog(capsys):
-    """The header names it, and the register map of a bus has the bit by which depths are kept."""
+    """The header names the test, and the register map of a bus has the bit that keeps depths."""
     options = ["--top", "render", "--method", "linear", "--coarse", "64x48", "--bus", "axi", "-o", "core.v"]
     assert main(["verilog", *options]) == 0
     assert "coarse depth test: pictures of at most 64x48, 384 words of 36 bits" in Path("core.v").read_text()
@@ -70,7 +73,7 @@ def test_coarse_depth_test_in_verilog(capsys):
 
 @pytest.mark.long
 def test_two_setups():
-    """The same picture, in fewer cycles; spans are refused."""
+    """The picture is the same in fewer cycles. With spans from software the option is refused."""
     found = {}
     for setups in ("1", "2"):
         options = [*SMALL, *HARDWARE, "--setups", setups, "-o", f"{setups}.png", "--json", f"{setups}.json"]
@@ -83,7 +86,7 @@ def test_two_setups():
 
 @pytest.mark.long
 def test_turntable():
-    """Each frame is the model's; errors, cycles and counters are those of all."""
+    """Each frame equals the model's. Errors, cycles and counters are those of all frames."""
     options = [*SMALL, *HARDWARE, "--frames", "2", "--jobs", "1", "-o", "a.gif", "--json", "a.json"]
     assert main(["render", *options]) == 0
     figures = json.loads(Path("a.json").read_text())
@@ -99,7 +102,7 @@ def test_turntable():
 
 @pytest.mark.long
 def test_verilog():
-    """Triangles in, pixels and a memory of depths out."""
+    """The core takes triangles, and has pixels and a memory of depths as output."""
     assert main(["verilog", *HARDWARE, "--method", "linear", "-o", "a.v"]) == 0
     text = Path("a.v").read_text()
     header, body = text.split("module blysk (", 1)
@@ -112,7 +115,7 @@ def test_verilog():
 
 @pytest.mark.long
 def test_same_from_python(capsys):
-    """Frame and Verilog by the functions of the package; of lines without a normaliser."""
+    """Functions of the package give the same frame and Verilog, here of lines without a normaliser."""
     assert main(["render", *SMALL, *HARDWARE, "-o", "a.png", "--json", "a.json"]) == 0
     drawn = blysk.scene("teapot", triangles=500, size=(64, 48))
     frame = blysk.render(drawn, geometry="hardware")
@@ -134,7 +137,7 @@ def test_same_from_python(capsys):
 
 @pytest.mark.long
 def test_several_lights(capsys):
-    """With the defaults: errors within the bound that is printed; Verilog tells of the axes."""
+    """With the defaults errors are within the printed bound, and the Verilog explains the axes."""
     lights = "--light", "1,1,1", "--light", "-1,0.5,1"
     assert main(["render", *SMALL, *HARDWARE, *lights, "-o", "a.png", "--json", "a.json"]) == 0
     frame = json.loads(Path("a.json").read_text())
@@ -161,17 +164,18 @@ UNKNOWN = "use one of software, hardware"
         ((*RENDER, "--geometry", "x"), "--geometry x", UNKNOWN),
         ((*VERILOG, "--geometry", "x"), "--geometry x", UNKNOWN),
         ((*RENDER, *HARDWARE, "--specialise"), "", SPANS),
-        # Values of spans; another method does not help: of triangles none serves a point light.
+        # This takes values of spans. Another method does not help, because no method draws a point light from
+        # triangles.
         ((*RENDER, *HARDWARE, *LOCAL), "", VALUES),
         ((*RENDER, *HARDWARE, *POINT_LIGHT), "", "the values of a span; use software"),
         ((*RENDER, *HARDWARE, *POINT_LIGHT, *LOCAL), "", "the values of a span; use software"),
         ((*RENDER, *HARDWARE, "--size", "4095x4095"), "--geometry hardware at 4095x4095", "2,097,152 pixels"),
-        # The remedy is not one that is refused, too.
+        # The remedy must not be refused, too.
         ((*RENDER, *HARDWARE, "--short-words"), "--short-words", "leave it out"),
         ((*RENDER, "--coarse"), "--coarse", "also give geometry hardware"),
         ((*RENDER, "--setups", "2"), "--setups 2", NO_SETUP + "also give geometry hardware"),
         ((*VERILOG, *HARDWARE, *LOCAL), "", "takes values"),
-        # It would send spans.
+        # The core would send spans.
         ((*VERILOG, *HARDWARE, "--testbench", "a"), "--testbench", "takes triangles"),
         ((*VERILOG, "--coarse", "64x48"), "--coarse", "also give top render"),
         ((*VERILOG, "--setups", "2"), "--setups 2", NO_SETUP + "use top geometry or render"),

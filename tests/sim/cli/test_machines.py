@@ -1,4 +1,4 @@
-"""Machines without a home, a cache or a folder that can be written: one line, and the work is done or not."""
+"""Machines without a home, a cache or a writable folder: one line, and the work is done, or refused."""
 
 import os
 import subprocess
@@ -19,7 +19,7 @@ pytestmark = pytest.mark.skipif(not Path("/proc/self").exists(), reason="/proc i
 
 
 def blysk(*arguments, folder, launcher=(), **places):
-    """Status, output and lines of errors of a command in an environment of these folders."""
+    """Status, output and lines of errors of a command in an environment with these folders."""
     environment = {name: value for name, value in os.environ.items() if name not in PLACES} | places
     program = "import sys; from blysk.sim.cli.main import main; sys.exit(main())"
     command = [*launcher, sys.executable, "-c", program, *map(str, arguments)]
@@ -50,7 +50,7 @@ def test_no_cache(tmp_path, places, command):
 
 @pytest.mark.long
 def test_no_home_for_other_tools(tmp_path):
-    """A command that imports Matplotlib, which has lines of its own to say."""
+    """A command that imports Matplotlib, which prints lines of its own."""
     status, _, errors = blysk("bench", "--help", folder=tmp_path, HOME="/proc")
     assert (status, len(errors)) == (0, 1), errors
     assert errors[0].endswith(WARNING)
@@ -58,7 +58,7 @@ def test_no_home_for_other_tools(tmp_path):
 
 @pytest.mark.long
 def test_compiled_engine_without_a_cache(tmp_path):
-    """Yosys' WebAssembly, the compiler and the model, in a folder that is gone afterwards."""
+    """Yosys' WebAssembly, the compiler and the model are in a folder that is gone afterwards."""
     temporary = tmp_path / "temporary"
     temporary.mkdir()
     render = [*RENDER[:-1], "cxxrtl", "-o", tmp_path / "a.png"]
@@ -71,7 +71,7 @@ def test_compiled_engine_without_a_cache(tmp_path):
 @pytest.mark.long
 @pytest.mark.skipif(not hasattr(os, "getuid") or os.getuid() != 0, reason="needs another user")
 def test_user_of_no_name(tmp_path):
-    """Neither HOME nor an entry among the users; `--help` of a command makes the caches, too."""
+    """There is neither HOME nor an entry for the user. `--help` of a command makes the caches, too."""
     change = ["setpriv", "--reuid", "54321", "--clear-groups"]
     if subprocess.run([*change, sys.executable, "-c", "import blysk.sim"], capture_output=True).returncode:
         pytest.skip("another user may not read this installation")
@@ -83,7 +83,7 @@ def test_user_of_no_name(tmp_path):
 @pytest.mark.ci
 @pytest.mark.long
 def test_folder_that_cannot_be_written(tmp_path):
-    """Found out before the mesh is read, and to the superuser as well."""
+    """This is found before the mesh is read, also for the superuser."""
     status, _, errors = blysk(*RENDER, folder="/proc", HOME=str(tmp_path))
     assert status == 2
     assert len(errors) == 1
@@ -122,7 +122,7 @@ def test_failed_output_leaves_no_picture(tmp_path, monkeypatch, capsys, option, 
 
 
 def test_picture_waits_for_the_figures(tmp_path, monkeypatch, capsys):
-    """A disk that is full when the figures are written, after the picture."""
+    """The disk is full when the figures are written, after the picture."""
 
     def full(path, value):
         raise InputError(path, "cannot be written, the disk is full", "free some space")

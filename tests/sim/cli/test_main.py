@@ -54,7 +54,7 @@ print(errors.getvalue().count("blysk: "))
 
 
 def test_help_and_refused_options_are_quick():
-    """They load nothing that takes long to import."""
+    """Help and refusals import nothing that takes long."""
     refused = [
         "render teapot --size 3",
         "render missing.obj",
@@ -80,7 +80,7 @@ def test_help_names_every_key_of_a_scene_file(capsys):
 
 
 def test_components_that_nothing_elaborates_are_not_told():
-    """Not behind the command either, when the filters of its run are gone."""
+    """Amaranth's warning does not appear, also after the command, when the filters of its run are gone."""
     code = "from blysk.hdl.pipeline import ShadingPipelineUnit; from blysk.sim.cli.main import main"
     code += "; main(['verilog', '-o', 'a.v']); ShadingPipelineUnit(); import gc; gc.collect()"
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True)
@@ -100,7 +100,7 @@ def test_verilog(capsys):
     assert capsys.readouterr() == ("", "")
     text = Path("core.v").read_text()
     assert "model cosquad7, lights 1" in text
-    # The same text in another process, whatever the order of its sets.
+    # The text is the same in another process, whatever the order of its sets.
     environment = {**os.environ, "PYTHONHASHSEED": "12345"}
     again = subprocess.run([*PROGRAM, *command], env=environment, capture_output=True, text=True)
     assert (again.stdout, again.stderr) == (text, "")
@@ -110,7 +110,7 @@ def test_verilog(capsys):
 @pytest.mark.long
 @pytest.mark.skipif(os.name != "posix", reason="signals")
 def test_interrupt():
-    """Ctrl-C in a long run: one line, status 130, nothing left behind."""
+    """After Ctrl-C in a long run there is one line and status 130, and no file is left."""
     options = ["--engine", "pysim", "--vcd", "a.vcd", "--json", "a.json", "--compare", "a.png"]
     process = subprocess.Popen(
         [*PROGRAM, "render", "teapot", *options], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
@@ -127,7 +127,7 @@ def test_interrupt():
 
 
 def test_interrupt_while_it_is_imported(monkeypatch, capsys):
-    """The first second of a command is its imports."""
+    """The first second of a command is spent on its imports."""
 
     class Slow(ModuleType):
         def __getattr__(self, name):

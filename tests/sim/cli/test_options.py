@@ -14,7 +14,7 @@ pytestmark = pytest.mark.usefixtures("folder")
 
 
 def test_bad_mesh(refused):
-    """What is told of each kind is held by the tests of meshes."""
+    """The tests of meshes check the message of each kind."""
     Path("a.obj").write_bytes(CORNERS + b"v nan 0 0\nf 1 2 4\n")
     refused("render", "a.obj", "-o", "out.png", "--json", "out.json", thing="a.obj", says="NaN or infinite")
     refused("render", "nowhere.obj", thing="nowhere.obj", says="there is no such file")
@@ -142,7 +142,7 @@ def test_wrong_command(capsys, arguments, says):
 
 @pytest.mark.parametrize("option", ["-o", "--compare", "--json", "--vcd"])
 def test_unwritable_output(refused, option):
-    """Before the mesh is looked for."""
+    """The output is checked before the mesh is searched."""
     suffix = {"--json": "json", "--vcd": "vcd"}.get(option, "png")
     name, says = f"nowhere/a.{suffix}", "there is no folder nowhere; make the folder first"
     refused("render", "missing.obj", option, name, thing=name, says=says)

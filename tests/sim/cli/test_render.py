@@ -1,4 +1,4 @@
-"""What a run of ``blysk render`` writes and says, with a compiler and without one."""
+"""Files and output of ``blysk render``, with a compiler and without."""
 
 import contextlib
 import io
@@ -47,7 +47,7 @@ def test_specialised_pipeline_says_what_it_leaves_out(folder, capsys):
 
 @pytest.fixture(scope="module")
 def rendered(tmp_path_factory):
-    """One run with every output of the compiled engine: its folder and what it printed."""
+    """One run of the compiled engine with every output: its folder, and its printed text."""
     folder = tmp_path_factory.mktemp("rendered")
     names = [folder / name for name in ("a.png", "both.png", "a.json")]
     with contextlib.redirect_stdout(io.StringIO()) as output:
@@ -105,12 +105,12 @@ def test_figures(rendered):
         assert 0 < error["rmse_lsb"] <= error["max_lsb"]
         assert error["p999_lsb"] <= error["max_lsb"]
         assert error["psnr_db"] == pytest.approx(20 * np.log10(255 / error["rmse_lsb"]), rel=1e-12)
-    # Half an LSB of rounding and as much of arithmetic; the model itself is off by tens of LSB.
+    # Half an LSB is rounding, and half an LSB arithmetic. The model itself is off by tens of LSB.
     assert figures["arithmetic_error"]["max_lsb"] <= figures["total_error"]["max_lsb"] < 0.75
     assert 0 < figures["nmse"] < 1
     assert figures["mnse_published"] > 0
 
-    # Every figure is printed, and every printed file is there.
+    # Every figure is printed, and every printed file exists.
     for name in whole:
         assert f"{figures[name]:,}" in output
     assert f"{figures['cycles_per_pixel']:.3f} a pixel" in output
@@ -167,7 +167,10 @@ def test_what_is_not_read_is_told_in_one_line(capsys, options):
 
 
 def test_normals_that_turn_a_mesh_black_are_told(capsys):
-    """A ball wound inwards whose normals point outwards; the named option lights it."""
+    """A ball is wound inwards, and its normals point outwards.
+
+    The option that the message names lights it.
+    """
     ball = trimesh.creation.icosphere(subdivisions=1)
     trimesh.Trimesh(ball.vertices, ball.faces[:, ::-1], vertex_normals=ball.vertices, process=False).export(
         "a.ply", vertex_normal=True
@@ -207,7 +210,7 @@ def test_waveforms(capsys):
     clock = set(re.findall(r"\$var wire 1 (\S+) clk \$end", head))
     assert len(clock) == 1
     ticks = changes.splitlines().count(f"1{clock.pop()}")
-    # To the last pixel, and 64 cycles more to see that no other comes.
+    # To the last pixel, and 64 further cycles to see that no other pixel comes.
     assert figures["cycles"] <= ticks <= figures["cycles"] + 70
     assert set(files()) == {Path("a.vcd"), Path("a.json"), Path("teapot-blysk.png")}
 
@@ -241,7 +244,7 @@ def test_without_compiler(capsys, request, obstacle):
 @pytest.mark.ci
 @pytest.mark.long
 def test_fallback_without_compiler(hidden, capsys, monkeypatch):
-    """One line and a smaller picture; the line of a cache that others can write is one of its own."""
+    """One line, and a smaller picture. If others can write the cache, there is a separate line."""
     Path("shared").mkdir()
     Path("shared").chmod(0o777)
     monkeypatch.setenv("BLYSK_CACHE", "shared")

@@ -1,4 +1,4 @@
-"""Scene files and options say the same, and what both refuse."""
+"""Scene files and options have the same meaning and the same refusals."""
 
 import json
 from pathlib import Path
@@ -94,14 +94,14 @@ def test_options_go_before_the_scene_file(scenes, capsys):
     assert Path("a.png").read_bytes() == Path("b.png").read_bytes()
     assert figures_of("a.json") == figures_of("b.json")
     assert (figures_of("a.json")["lights"], figures_of("a.json")["width"]) == (1, 32)
-    # A default that is written out is given, too.
+    # A default that is written out counts as given.
     assert main(["render", "scenes/a.toml", "--exponent", "50", "--json", "a.json"]) == 0
     assert figures_of("a.json")["exponent"] == 50
 
 
 @pytest.mark.long
 def test_position_of_the_camera(capsys):
-    """A camera by its position, in any unit of the mesh, and the middle of the mesh as its target."""
+    """A camera given by its position, in any unit of the mesh. Its target is the middle of the mesh."""
 
     def draw(unit, name, place):
         mesh = trimesh.creation.box((2, 1, 1))
@@ -133,7 +133,7 @@ def test_position_of_the_camera(capsys):
         assert np.array_equal(
             FrameSimulator(preset("linear", "cosquad", transfer="srgb")).render(scene).image, expected
         )
-    # --view takes the place of the file's position.
+    # --view replaces the file's position.
     options = ["--size", "64x48", "--method", "linear", "--view", "1,2,3"]
     assert main(["render", "middle.toml", "--view", "1,2,3", "-o", "again.png"]) == 0
     assert main(["render", "a.obj", *options, "-o", "view.png"]) == 0
@@ -141,7 +141,7 @@ def test_position_of_the_camera(capsys):
 
 
 def test_no_light(capsys):
-    """Ambient light only."""
+    """There is only ambient light."""
     Path("a.toml").write_text("lights = []\nsize = [16, 12]\nmesh.file = 'teapot'\nmaterial.ambient = 0.2\n")
     assert main(["render", "a.toml"]) == 0
     assert capsys.readouterr().err == ""
@@ -222,7 +222,7 @@ def test_point_lights(folder, refused, capsys):
 
 @pytest.mark.long
 def test_unit_of_the_mesh_does_not_matter(capsys):
-    """Products of the coordinates of the second and third would under- and overflow."""
+    """Products of coordinates of the second and the third mesh would underflow and overflow."""
     pictures = []
     for unit in ("", "e-310", "e300"):
         points = [f"v -1{unit} 0 0", f"v 1{unit} 0 0", f"v 0 1{unit} 0", "f 1 2 3"]

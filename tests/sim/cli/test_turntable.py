@@ -22,7 +22,7 @@ pytestmark = pytest.mark.usefixtures("folder")
 
 @pytest.fixture(scope="module")
 def turned(tmp_path_factory):
-    """One turntable with its figures: its folder and what it printed."""
+    """One turntable with its figures: its folder, and its printed text."""
     folder = tmp_path_factory.mktemp("turned")
     arguments = ["render", *TINY, "--frames", "5", "--jobs", "1", "--method", "linear"]
     with contextlib.redirect_stdout(io.StringIO()) as output:
@@ -75,7 +75,7 @@ def test_a_turntable_of_one_frame_is_the_frame(capsys):
 
 @pytest.mark.skipif(not Path("/dev/full").exists(), reason="needs a disk that is full")
 def test_failed_figures_leave_no_frames(capsys):
-    """A turntable whose figures cannot be written; files of others stay."""
+    """The figures of a turntable cannot be written. Files of others stay."""
     Path("a-0003.png").write_text("another's")
     options = ["--method", "linear", "--frames", "2", "--jobs", "1", "-o", "a.gif", "--json", "/dev/full"]
     assert main(["render", *TINY, *options]) == 2
@@ -87,7 +87,10 @@ def test_failed_figures_leave_no_frames(capsys):
 @pytest.mark.skipif(os.name != "posix", reason="signals")
 @pytest.mark.parametrize("way", ["interrupt", "termination", "kill"])
 def test_end_of_a_turntable(way):
-    """Frames done stay, whole, and no process goes on: Ctrl-C reaches all processes, the others one."""
+    """Finished frames stay whole, and no process goes on.
+
+    Ctrl-C reaches all processes, other signals one process.
+    """
     arguments = ["render", "teapot", "--triangles", "100", "--size", "32x24", "--engine", "pysim"]
     process = subprocess.Popen(
         [*PROGRAM, *arguments, "--frames", "200", "--jobs", "2", "-o", "a.gif"],
@@ -102,10 +105,10 @@ def test_end_of_a_turntable(way):
             os.killpg(process.pid, signal.SIGINT)
         else:
             os.kill(process.pid, signal.SIGKILL if way == "kill" else signal.SIGTERM)
-        # Returns when nobody holds the pipes any more: neither the program nor one of its workers.
+        # This returns when nobody holds the pipes any more: neither the program nor one of its workers.
         output, errors = process.communicate(timeout=60)
         if way == "kill":
-            # Python's own tracker of semaphores tells that it cleans up.
+            # Python's own tracker of semaphores prints that it cleans up.
             assert (process.returncode, output) == (-signal.SIGKILL, "")
             assert "Traceback" not in errors
         else:

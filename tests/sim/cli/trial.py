@@ -1,8 +1,8 @@
-"""A program that tries malformed files and bad values of every option, one by one.
+"""A program that tries malformed files and bad values of every option, one after the other.
 
-``python trial.py FOLDER SEED COUNT EVERY`` tries ``COUNT`` files and every ``EVERY``-th option, each in a
-process forked from itself that has ten seconds of the processor, a minute in all, and a gibibyte more than it
-begins with, and prints a line of JSON for each.
+``python trial.py FOLDER SEED COUNT EVERY`` tries ``COUNT`` files and every ``EVERY``-th option. Each is tried
+in a forked process, which may take ten seconds of the processor, a minute in all, and a gibibyte more than at
+its start. The program prints a line of JSON for each.
 """
 
 import contextlib
@@ -73,7 +73,7 @@ _OF_TYPE = {
 }
 
 _OF_NAME = {
-    # `blysk pages` makes its folder, and those above it.
+    # `blysk pages` makes its folder, and the folders above it.
     "folder": [*split("file|file/folder"), "x" * 300],
     "mesh": _BAD_MESHES,
     "meshes": _BAD_MESHES,
@@ -82,7 +82,7 @@ _OF_NAME = {
     "name": split("| |\n|a\nb|ż🫖|\udcff|\x1b[31m|--|1a|a b|a-b"),
 }
 
-# An intensity may be more than 1, as that of a light; an axis has a name.
+# An intensity of a light may be over 1. An axis has a name.
 _GOOD = {"ambient_light": "1.1", "up": "x"}
 
 _SUFFIXES = {"output": ".png", "comparison": ".png", "figures": ".json", "vcd": ".vcd"}
@@ -131,7 +131,7 @@ def _put(folder: Path, files: dict[str, Any]) -> None:
 
 
 def _listing(folder: Path) -> dict[str, Any]:
-    """What is in a folder, by name: size and time of change."""
+    """Contents of a folder by name: size and time of change."""
     found = {}
     for path in sorted(folder.rglob("*")):
         status = path.lstat()
@@ -141,13 +141,14 @@ def _listing(folder: Path) -> dict[str, Any]:
 
 
 def _memory(field: str) -> int:
-    """Bytes of address space that this process has, or had at most."""
+    """Bytes of address space of this process, now or at most."""
     text = Path("/proc/self/status").read_text()
     return 1024 * int(text.partition(f"{field}:")[2].split()[0])
 
 
 def _attempt(case: Case, folder: Path, output: Path) -> None:
-    """In a process of its own: run the command line, and end with its status; 99 where it raised."""
+    """Run the command line in a forked process, and end with its status, or with 99 if it raised an
+    exception."""
     status = 99
     try:
         for name, number in (("out", 1), ("err", 2)):
@@ -169,7 +170,7 @@ def _attempt(case: Case, folder: Path, output: Path) -> None:
 
 
 def attempt(case: Case, root: Path) -> dict[str, Any]:
-    """What the command line does about a case: its status, what it says, takes and leaves behind."""
+    """Try a case: the status, the output, the resources, and the files that are left."""
     folder, output = root / "outside" / "folder", root / "output"
     for path in (folder.parent, output, Path(tempfile.gettempdir())):
         shutil.rmtree(path, ignore_errors=True)
@@ -205,7 +206,7 @@ def attempt(case: Case, root: Path) -> dict[str, Any]:
 
 
 def _simulate_by_model() -> None:
-    """Draw by the bit-accurate model: what is tried is what comes before the pipeline, and behind it."""
+    """Draw by the bit-accurate model, because only the code before and behind the pipeline is tried."""
 
     class Stub:
         def __init__(self, design, *_):
@@ -220,7 +221,7 @@ def _simulate_by_model() -> None:
 
 
 def _warm_up(root: Path, cases: list[Case]) -> None:
-    """Import and look up, before the processes are forked, what each of them would."""
+    """Import modules before the processes are forked, because each process would import them."""
     folder = root / "first"
     folder.mkdir()
     here = os.getcwd()
@@ -234,9 +235,9 @@ def _warm_up(root: Path, cases: list[Case]) -> None:
 
 
 def run(root: Path, seed: int, count: int, every: int) -> None:
-    """Try the good files, malformed files and bad options, and print what came of each."""
+    """Try the good files, malformed files and bad options, and print each outcome."""
     _simulate_by_model()
-    # The hardest: names come out of it in some form all the same.
+    # This is the hardest case: names still come out of it in some form.
     sys.stdout.reconfigure(encoding="ascii")
     for path in (root / "temporary", root / "cache"):
         path.mkdir(mode=0o700)

@@ -1,4 +1,4 @@
-"""Small components of many kinds, one that breaks the rules of a stream, and runs of both engines."""
+"""Small components of many kinds, a component that breaks the rules of a stream, and runs of both engines."""
 
 import numpy as np
 from amaranth.hdl import Module, Mux, Signal, signed, unsigned
@@ -12,7 +12,7 @@ PAIR = data.StructLayout({"x": unsigned(16), "y": signed(18)})
 
 
 def refused(component):
-    """A component that is never elaborated, which Amaranth would warn about."""
+    """A component that is never elaborated, without Amaranth's warning."""
     component._MustUse__silence = True
     return component
 
@@ -23,7 +23,7 @@ def pairs(count, seed=1):
 
 
 class Register(Component):
-    """``2 y + 1`` through one register; ready depends on the sink's."""
+    """``2 y + 1`` through one register. Ready depends on the sink's ready."""
 
     i: In(stream.Signature(PAIR))
     o: Out(stream.Signature(signed(19)))
@@ -41,7 +41,10 @@ class Register(Component):
 
 
 class Expander(Component):
-    """``x mod 8`` output beats an input beat: the index in it, and ``y``. No beat where that is 0."""
+    """``x mod 8`` output beats for each input beat, with their index and ``y``.
+
+    There is none if ``x mod 8`` is 0.
+    """
 
     i: In(stream.Signature(PAIR))
     o: Out(stream.Signature(data.StructLayout({"index": 3, "y": signed(18)})))
@@ -65,7 +68,7 @@ class Expander(Component):
 
 
 class Lookup(Component):
-    """``table[x mod 50] - y`` from a ROM in a submodule; its last rows are not there and read as 0."""
+    """``table[x mod 50] - y`` from a ROM in a submodule. Its last rows are missing and read as 0."""
 
     i: In(stream.Signature(PAIR))
     o: Out(stream.Signature(signed(20)))
@@ -108,7 +111,7 @@ class Lookup(Component):
 
 
 class Accumulator(Component):
-    """Writes fill a memory; a beat gives ``scale * memory[x mod 4] + y``; status counts."""
+    """Writes fill a memory. A beat gives ``scale * memory[x mod 4] + y``, and the status counts."""
 
     i: In(stream.Signature(PAIR))
     o: Out(stream.Signature(signed(40)))
@@ -122,7 +125,7 @@ class Accumulator(Component):
         store, fetch = memory.write_port(), memory.read_port(domain="comb")
         beat = Signal()
         m.d.comb += [
-            # A write is taken on every other clock.
+            # A write is taken in every second cycle.
             self.write.ready.eq(beat),
             store.addr.eq(self.write.payload.row),
             store.data.eq(self.write.payload.value),
@@ -149,7 +152,7 @@ ALL = [Register, Expander, Lookup]
 
 
 class Plain(Component):
-    """Members of plain signed shapes, ``i * constants + status``; a write sets the status."""
+    """Members of plain signed shapes, ``i * constants + status``. A write sets the status."""
 
     i: In(stream.Signature(signed(18)))
     o: Out(stream.Signature(signed(36)))
@@ -219,7 +222,7 @@ def assert_equal(first, second):
 
 
 def both(component, beats, count, **options):
-    """A run of both engines, which agree."""
+    """A run of both engines, which must agree."""
     slow, fast = (
         simulate(component, beats, count=count, engine=engine, **options) for engine in ("pysim", "cxxrtl")
     )

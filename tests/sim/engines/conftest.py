@@ -10,14 +10,14 @@ from .scale import BEATS, scaled, script
 
 @pytest.fixture(scope="module")
 def logged(tmp_path_factory):
-    """A compiler that writes into `LOG` what it compiles."""
+    """A compiler that notes in `LOG` what it compiles."""
     text = 'case "$*" in *driver.cc*) echo x >> "$LOG";; esac; exec c++ "$@"'
     return script(tmp_path_factory.mktemp("compiler"), "logged", text)
 
 
 @pytest.fixture
 def builds(tmp_path, logged, monkeypatch):
-    """Number of models compiled so far, as a function."""
+    """A function that gives the number of models compiled so far."""
     log = tmp_path / "log"
     log.touch()
     monkeypatch.setenv("LOG", str(log))
@@ -38,6 +38,6 @@ def prebuilt(tmp_path_factory, logged):
 
 @pytest.fixture
 def filled(prebuilt, cache, builds):
-    """The cache, with that model in it; ``builds`` is 0."""
+    """The cache with that model in it; ``builds`` is 0."""
     shutil.copytree(prebuilt, cache)
     return cache

@@ -1,4 +1,4 @@
-"""A small component for tests of the compiled engine, a cache of their own, and other processes."""
+"""A small component for tests of the compiled engine, for the cache of a test, and for other processes."""
 
 import os
 import subprocess
@@ -46,7 +46,7 @@ def entries(folder, suffix=".model"):
 
 
 def left_in(*folders):
-    """Files in folders, which may not be there."""
+    """Files in folders, which may not exist."""
     return [path for folder in folders if folder.exists() for path in folder.rglob("*") if path.is_file()]
 
 

@@ -71,7 +71,7 @@ def test_corrupted_entry_is_built_again(filled, builds, damage):
         del content[-100:]
     else:
         content = b""
-    # A new file: the one that is loaded stays mapped.
+    # This is a new file, because the loaded file stays mapped.
     entry.unlink()
     entry.write_bytes(content)
     assert scaled() == (3 * BEATS).tolist()
@@ -140,7 +140,7 @@ def test_cache_that_cannot_be_made(cache, monkeypatch):
 
 def test_cache_that_cannot_be_written(cache, monkeypatch):
     cache.mkdir(mode=0o500)
-    # The superuser may write anywhere; then only the answer can be tried.
+    # The superuser may write anywhere, so only the answer can be tested.
     access = os.access
     monkeypatch.setattr(os, "access", lambda path, mode: Path(path) != cache and access(path, mode))
     with pytest.warns(RuntimeWarning, match="cannot be written: compiled models are kept for this run only"):
@@ -175,9 +175,9 @@ def test_default_cache_is_the_users(monkeypatch, tmp_path):
 
 
 def test_two_processes_at_once(builds, cache):
-    """Both find the cache empty and build; one entry is left, whole, and nothing beside it."""
+    """Both processes find the cache empty and build. One whole entry is left, and nothing beside it."""
     program = "print(simulate(Triple(), np.arange(5), count=5).beats.tolist())"
-    # Other hash seeds: the netlist, and with it the key, must not depend on the order of sets.
+    # The hash seeds differ: the netlist, and so the key, must not depend on the order of sets.
     processes = [start(program, PYTHONHASHSEED=seed) for seed in ("1", "2")]
     for process in processes:
         output, errors = process.communicate(timeout=60)
@@ -194,18 +194,18 @@ def test_two_processes_at_once(builds, cache):
 
 
 class Elsewhere:
-    """Of a module whose version nobody knows."""
+    """The version of a module whose version is unknown."""
 
 
 def diffuse(latency, origin):
-    """Cycles that a beat takes, which are the latency."""
+    """A unit with a latency of this many cycles."""
     run = simulate(DiffuseUnit(latency=latency), np.arange(3), count=3, origin=origin)
     return int(run.cycles[0] - run.input_cycles[0])
 
 
 @pytest.fixture
 def netlists(monkeypatch):
-    """Components that were made to netlists."""
+    """Components from which netlists were made."""
     found, netlist_of = [], cxxrtl.netlist_of
     monkeypatch.setattr(cxxrtl, "netlist_of", lambda unit: found.append(unit) or netlist_of(unit))
     return found
@@ -257,7 +257,7 @@ def test_code_version_tells_libraries_apart(monkeypatch):
 
 
 def test_text_of_every_rewriting_module_is_in_the_key():
-    """A model that another text of them would write anew is not taken from the cache."""
+    """If the text of a rewriting module changes, the model is not taken from the cache."""
     seen, imported = [], re.compile(r"^from blysk\.sim\.engines\.(\w+) import", re.MULTILINE)
     waiting = ["parts", "guards", "words"]
     while waiting:

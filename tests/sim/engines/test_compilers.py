@@ -1,4 +1,4 @@
-"""Compilers that are missing, fail or lie; what the compiled engine refuses; its operations."""
+"""Compilers that are missing, fail or produce wrong code; refusals of the compiled engine; its operations."""
 
 import functools
 import importlib.util
@@ -100,7 +100,7 @@ class Operations(Component):
         return m
 
     def expected(self, beats):
-        """What Python's integers give, for words of a and b as one integer each, and c."""
+        """Results of Python's integers, for words of a and b as one integer each, and c."""
         widths = [len(result) for result in self.results()]
         rows = []
         for words in beats:
@@ -126,7 +126,7 @@ class Operations(Component):
     "is_signed", [False, pytest.param(True, marks=pytest.mark.ci)], ids=["unsigned", "signed"]
 )
 def test_operations_against_integers(is_signed):
-    """The driver's own operations, which stand in for CXXRTL's, in Python's integers."""
+    """The driver's own operations, which replace CXXRTL's, are compared with Python's integers."""
     rng = random.Random(3)
     edges = [0, 1, 2, -1, -2, *(sign << width - 1 for pair in WIDTHS for width in pair for sign in (1, -1))]
     beats = [
@@ -191,7 +191,10 @@ BROKEN = {
     ],
 )
 def test_broken_compiler(monkeypatch, tmp_path, cache, temporary, name):
-    """One line, and nothing is left of what it wrote; the next compiler finds all as it was."""
+    """There is one line, and no file that the compiler wrote is left.
+
+    The next compiler finds everything unchanged.
+    """
     text, reason = BROKEN[name]
     path = script(tmp_path, "broken", text)
     monkeypatch.setenv("CXX", path)
@@ -226,7 +229,7 @@ def test_a_broken_compiler_gives_way_to_the_next(monkeypatch, tmp_path):
 
 
 def test_compiler_that_miscompiles_is_found_out(monkeypatch, tmp_path, cache):
-    """The check against pysim: a compiler that changes the factor 3."""
+    """The check against pysim finds a compiler that changes the factor 3."""
     text = (
         'case "$1" in --version) exec c++ --version;; esac; '
         "sed -i 's/0x3ull <</0x2ull <</' model.cc; "
@@ -246,7 +249,10 @@ def test_compiler_that_miscompiles_is_found_out(monkeypatch, tmp_path, cache):
 
 
 class Buffer(Component):
-    """A queue of 16 in a memory with a write port: CXXRTL's run time needs `operator new` and a vector."""
+    """A queue of 16 in a memory with a write port.
+
+    CXXRTL's run time then needs `operator new` and a vector.
+    """
 
     i: In(stream.Signature(35))
     o: Out(stream.Signature(35))

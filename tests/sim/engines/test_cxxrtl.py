@@ -63,7 +63,7 @@ def test_errors_are_the_same_in_batches(monkeypatch, end):
 
 
 def test_interrupt_between_batches(filled):
-    """Ctrl-C ends a run that would take for ever, within a batch or so."""
+    """Ctrl-C ends a run that would take for ever, within about a batch."""
     if threading.current_thread() is not threading.main_thread():
         pytest.skip("signals go to the main thread")
     component = Scale()
@@ -92,7 +92,7 @@ def test_an_exception_in_progress_ends_the_run(filled):
 
 @pytest.mark.parametrize("enabled", [True, False])
 def test_garbage_collection_is_as_before(enabled, filled, monkeypatch):
-    """Off while a netlist is made, also when that fails; then as the caller has it."""
+    """Collection is off while a netlist is made, and afterwards as the caller had it, also if that fails."""
     seen = []
     convert = cxxrtl_source.rtlil.convert
 

@@ -1,4 +1,5 @@
-"""Registers grouped by what lets them change, and in place: the text, and that the machine is the same."""
+"""Registers grouped by the conditions under which they change, and changed in place: the text, and equal
+behaviour."""
 
 import re
 
@@ -17,7 +18,7 @@ from .components import both
 
 
 class Tangle(Component):
-    """Registers that swap, hold, go round and depend on each other, under questions inside questions."""
+    """Registers that swap, hold, go round and depend on each other, under nested conditions."""
 
     i: In(stream.Signature(data.StructLayout({"x": 16, "on": 3})))
     o: Out(stream.Signature(data.ArrayLayout(32, 4)))
@@ -43,7 +44,7 @@ class Tangle(Component):
             write.data.b.eq(swap[3] + x),
             write.en.eq(advance & on[1]),
         ]
-        # In the middle of the rest, and free of every question.
+        # In the middle of the rest, and under no condition.
         m.d.sync += free.eq(free + 1)
         with m.If(advance):
             m.d.sync += [self.o.valid.eq(self.i.valid), kept.low.eq(kept.high)]
@@ -62,7 +63,7 @@ class Tangle(Component):
                         out_of_range.eq(out_of_range * 5 + x),
                     ]
             with m.Elif(on[2]):
-                # Registers in both branches, and a part of one.
+                # Registers in both branches, and a part of a register.
                 m.d.sync += [ring[4].eq(Mux(on[1], ring[5], ring[4])), ring[5][4:9].eq(x)]
                 m.d.sync += Array(swap)[x[:2]].eq(free)
             with m.Switch(on):
@@ -90,7 +91,7 @@ def generated(component, monkeypatch):
 @pytest.mark.ci
 @pytest.mark.long
 def test_the_machine_is_the_same(monkeypatch):
-    """Against pysim, over four times the cycles that a new model is checked with, with stalls."""
+    """Against pysim under stalls, over four times the cycles of the check of a new model."""
     rng = np.random.default_rng(4)
     beats = {"x": rng.integers(0, 1 << 16, 1500), "on": rng.integers(0, 8, 1500)}
     component = Tangle()

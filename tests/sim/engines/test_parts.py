@@ -1,4 +1,4 @@
-"""Fields read where they come from: the text, and that the machine is the same."""
+"""Fields that are read at their source: the text, and equal behaviour."""
 
 import re
 
@@ -19,7 +19,7 @@ BITS = WORD.size
 
 
 class Fields(Component):
-    """Words put together, passed on, taken apart at other places, and fields across their borders."""
+    """Words joined, passed on, divided at other places, and fields across their borders."""
 
     i: In(stream.Signature(data.StructLayout({"low": 9, "a": 5, "b": 60, "on": 1, "high": 40})))
     o: Out(stream.Signature(data.ArrayLayout(60, 4)))
@@ -30,7 +30,7 @@ class Fields(Component):
         advance = Signal()
         m.d.comb += [advance.eq(~self.o.valid | self.o.ready), self.i.ready.eq(advance)]
         kept, swapped, again = (Signal(WORD, name=name) for name in ("kept", "swapped", "again"))
-        # A signal with the name that a part of another might get.
+        # A signal with the name that a part of another signal might get.
         swapped_0 = Signal(9, name="swapped_0")
         m.d.comb += [
             swapped_0.eq(x.low ^ 0x155),
@@ -77,11 +77,11 @@ def test_a_field_is_read_where_it_comes_from(monkeypatch):
         for plain in [generated(Fields(), monkeypatch)]
         for text in (plain, read_parts(plain))
     )
-    # A field that is one of a register, or has a word of its own; across a border the word itself is read.
+    # A field is read from a register, or has a word of its own. Across a border the word itself is read.
     assert "add_uu<41>(p_swapped.slice<114,75>().val(), p_swapped.slice<13,9>().val())" in before
     assert "add_uu<41>(p_kept.curr.slice<73,34>().val(), p_swapped_at_9.val())" in after
     assert "p_swapped.slice<114,60>()" in after
-    # What nobody reads any more is gone, what the driver reads is not.
+    # Words that nobody reads any more are gone. Words that the driver reads are not.
     assert "p_apart.slice<8,0>() = " in before
     assert not re.search(r"p_apart\b(?!_at)", after)
     assert "p_i____ready = " in after

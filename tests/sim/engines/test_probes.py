@@ -1,5 +1,5 @@
 # amaranth: UnusedElaboratable=no
-"""Words that are watched: those of the bit-accurate model, at their ages; the pipeline stays as it is."""
+"""Watched words equal those of the bit-accurate model, at their ages, and the pipeline does not change."""
 
 import numpy as np
 import pytest
@@ -46,7 +46,7 @@ def observed():
 
 
 def rows_of(component, spans, constants, cycles):
-    """Status on every clock, as its registers stand before the edge."""
+    """The status in every cycle, as its registers are before the edge."""
     queue = []
     for stream, beats in (
         (component.write, writes_of([constants])),
@@ -117,7 +117,7 @@ def test_formats_fit(method, model):
 
 
 def test_words_are_those_of_the_model(observed):
-    """Every word of every pixel, at its age behind the clock on which the lights take the pixel."""
+    """Every word of every pixel, at its age after the cycle in which the lights take the pixel."""
     spans, constants = spans_near(np.random.default_rng(5), 5), constants_of(4)
     count = int(spans.length.sum())
     rows = rows_of(observed, spans, constants, 200)
@@ -152,11 +152,11 @@ def test_words_are_those_of_the_model(observed):
         for clock, n in numbers.items():
             code = int(rows[clock + probe.age][probe.name])
             if probe.name.endswith("_sum"):
-                # It has the half step that makes a cut of the rounding.
+                # It has the half step with which a cut rounds.
                 code >>= DifferenceAccumulator().format.fraction_bits - COMPONENT.fraction_bits
             assert code == int(expected[probe.name][n]), (probe.name, clock, n)
 
-    # What follows one word from another.
+    # The words that follow from another word.
     ages = {probe.name: probe.age for probe in probes_of(observed.unit)}
     one = Specular.BASE_FORMAT.max_code
     followed = 0

@@ -1,4 +1,4 @@
-"""What the interpreted engine has of its own: waveforms, progress, errors of the component."""
+"""Features of the interpreted engine alone: waveforms, progress, errors of the component."""
 
 import numpy as np
 import pytest
@@ -40,7 +40,7 @@ def test_waveforms(tmp_path):
     text = file.read_text()
     assert "$enddefinitions" in text
     assert "i__payload" in text
-    # The first beat in, and its negative in nine bits.
+    # The first input beat, and its negative in nine bits.
     assert "b11 " in text
     assert "b111111101 " in text
 
@@ -48,7 +48,7 @@ def test_waveforms(tmp_path):
 def test_progress():
     seen = []
     run = simulate(Negate(), np.zeros(2500, dtype=int), count=2500, engine="pysim", progress=seen.append)
-    # Every 1000 cycles; the first beat leaves at clock 1.
+    # Every 1000 cycles. The first beat leaves at cycle 1.
     assert seen == [999, 1999]
     assert run.total_cycles == 2501
     with pytest.raises(KeyboardInterrupt):

@@ -50,7 +50,7 @@ def test_engines_agree_with_each_other_and_with_arithmetic(kind, stalls):
 
 
 def test_clocks_of_a_register():
-    """A beat taken at clock k comes out at k + 1 when nobody stalls, and clock 0 is the first."""
+    """Without stalls a beat taken at cycle k comes out at k + 1. Cycle 0 is the first."""
     run = both(Register(), pairs(9), 9)
     np.testing.assert_array_equal(run.input_cycles, np.arange(9))
     np.testing.assert_array_equal(run.cycles, np.arange(1, 10))
@@ -58,7 +58,7 @@ def test_clocks_of_a_register():
 
 
 def test_stall_patterns_are_by_clock_and_an_offer_is_held():
-    # Offers start at cycles 1, 4, 7 ... (stall 1, 0, 1); the sink is ready at cycles 0, 5, 10, 15 ...
+    # Offers start at cycles 1, 4, 7 ... (stall 1, 0, 1). The sink is ready at cycles 0, 5, 10, 15 ...
     run = both(
         Register(),
         pairs(3),
@@ -66,7 +66,7 @@ def test_stall_patterns_are_by_clock_and_an_offer_is_held():
         input_stalls=np.array([True, False, True]),
         output_stalls=np.array([False, True, True, True, True]),
     )
-    # Offered at 1 and taken, out from 2, taken at 5. Offered at 4, taken at 5 when the register is freed, out
+    # Offered at 1 and taken, out from 2, taken at 5. Offered at 4, taken at 5 when the register is free, out
     # at 10. Offered at 7, held until 10, out at 15.
     np.testing.assert_array_equal(run.input_cycles, [1, 5, 10])
     np.testing.assert_array_equal(run.cycles, [5, 10, 15])
@@ -97,7 +97,7 @@ def test_plain_signed_members():
 
 
 def test_writes_between_beats():
-    """A write is offered when so many beats are taken, beside the next one, which Plain takes at once."""
+    """A write is offered after some beats were taken, beside the next beat, which Plain takes at once."""
     beats, write, after = pairs(30)["y"], np.array([7, -16, 5, 3, -1]), np.array([0, 10, 10, 20, 30])
     run = both(Plain(), beats, 30, constants=-32768, write=write, write_after=after)
     # Beat k is taken at cycle k + 1, the writes at cycles 0, 11, 12, 21 and 31.
@@ -138,7 +138,7 @@ def test_one_component_many_runs():
 ONE_STALL = np.arange(20) == 13
 
 FAULTS = {
-    # Beat k waits in the register from clock k + 1 on; the sink stalls at clock 13.
+    # Beat k waits in the register from cycle k + 1 on. The sink stalls at cycle 13.
     "drops": "at clock 14, output beat 12: valid went low while the beat waited for ready",
     "changes": "at clock 14, output beat 12: the payload changed while the beat waited for ready",
     "loses": "nothing moved for 100 cycles up to clock 122: 19 of 20 output beats came, "
@@ -174,7 +174,7 @@ def test_no_fault_is_no_error():
 
 @pytest.mark.parametrize("engine", ["pysim", "cxxrtl"])
 def test_a_late_extra_beat_needs_enough_settle_cycles(engine):
-    """The invented beat shows at clock 22, one clock after the last of the 20."""
+    """The invented beat appears at cycle 22, one cycle after the last of the 20 beats."""
     arguments = {"count": 20, "engine": engine, "output_stalls": ONE_STALL}
     assert len(simulate(Faulty("invents"), pairs(20), settle=0, **arguments).beats) == 20
     with pytest.raises(SimulationError, match="a beat more"):

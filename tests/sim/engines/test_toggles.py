@@ -1,4 +1,4 @@
-"""Toggle counts against those of small components, known by hand, and of units with nothing to do."""
+"""Toggle counts against those of small components, found by hand, and of units with nothing to do."""
 
 from itertools import pairwise
 
@@ -14,7 +14,7 @@ from blysk.sim.engines.toggles import count_toggles
 
 
 class Sample(Component):
-    """The last beat, plain or inverted; in submodules a count, a table, and the lowest bit."""
+    """The last beat, plain or inverted. Submodules have a count, a table, and the lowest bit."""
 
     i: In(stream.Signature(8))
     o: Out(stream.Signature(8))
@@ -67,7 +67,10 @@ def test_counts_known_by_hand(engine):
 
 @pytest.mark.parametrize("engine", ["pysim", "auto"])
 def test_stalls_and_equal_beats_toggle_nothing(engine):
-    """The same beat over and over, the sink seldom ready: its first pass and valid are all."""
+    """The same beat comes over and over, and the sink is seldom ready.
+
+    Only its first pass and valid toggle.
+    """
     stalls = np.arange(10) != 7
     beats = np.full(20, 0xA5)
     run, toggles = count_toggles(
@@ -83,7 +86,10 @@ def test_stalls_and_equal_beats_toggle_nothing(engine):
 
 
 class Chain(Component):
-    """26 registers of 40 bits, each a clock behind the one before: words of a sum split and overflow."""
+    """26 registers of 40 bits, each a cycle behind the one before.
+
+    Words of a sum are divided and overflow.
+    """
 
     i: In(stream.Signature(40))
     o: Out(stream.Signature(40))
@@ -104,7 +110,8 @@ class Chain(Component):
 @pytest.mark.long
 @pytest.mark.parametrize("engine", ["pysim", "auto"])
 def test_many_wide_registers(engine):
-    """Stage k shows what it and those before held after reset, last first, then the beats."""
+    """Stage k has the words that it and the stages before it had after the reset, last first, and then the
+    beats."""
     beats = np.random.default_rng(4).integers(0, 1 << 40, 300)
     beats[100:200:2] = 0
     beats[101:200:2] = (1 << 40) - 1
@@ -118,10 +125,10 @@ def test_many_wide_registers(engine):
 
 @pytest.mark.parametrize("interval", [2, *(pytest.param(k, marks=pytest.mark.long) for k in (1, 4))])
 def test_dark_beats_toggle_only_their_input(interval):
-    """Operand isolation: 200 dark beats add nothing to the data path but to its first registers.
+    """200 dark beats add no toggles to the data path, except in its first registers.
 
-    These are that of one minus the cosine and, where one part serves several cycles, that of the input, which
-    takes what stands at the port after the last beat, too: all ones.
+    These are the registers of one minus the cosine. If one part serves several cycles, they also are the
+    registers of the input. Those take the word at the port after the last beat, too, which is all ones.
     """
     rng = np.random.default_rng(2)
     lit = ONE_SQUARED.codes - rng.integers(0, 1 << 32, 40)

@@ -1,5 +1,5 @@
 # amaranth: UnusedElaboratable=no
-"""WebAssembly modules: the same beats on the same cycles as the other engines."""
+"""WebAssembly modules give the same beats in the same cycles as the other engines."""
 
 import re
 from dataclasses import replace
@@ -26,7 +26,7 @@ from blysk.sim.installation import install_extra
 wasmtime = pytest.importorskip("wasmtime", reason="wasmtime is not installed")
 
 NONE = np.zeros(1, dtype=bool)
-# Spans through the place counters and the ambient colour: all of the driver, and little to compile.
+# Spans go through the counters of positions and the ambient colour: all of the driver, and little to compile.
 DESIGN = preset(model=None, lights=0)
 
 
@@ -89,7 +89,7 @@ class Browser:
         self.call("prepare", *self.arguments)
 
     def assert_gave(self, run):
-        """Output words, their cycles, and those of the input."""
+        """Check output words, their cycles, and the cycles of the input."""
         output = self.read(self.output, self.count * self.words, "<u4").reshape(self.count, self.words)
         np.testing.assert_array_equal(output, run.output)
         np.testing.assert_array_equal(self.read(self.cycles, self.count, "<i8"), run.cycles)
@@ -124,7 +124,7 @@ def test_same_beats_on_the_same_cycles(component, browser):
         drive = stimulus_of(component, spans)
         expected = Interpreted(component).run(drive)
         browser.prepare(drive, ports["o"]["words"])
-        # Again from power-up, in the same memory.
+        # A second run from power-up, in the same memory.
         for _ in range(3):
             browser.call("prepare", *browser.arguments)
             assert browser.call("run") == StopReason.DONE
@@ -191,7 +191,7 @@ def test_fields_of_a_pipeline_are_those_of_its_beats(component):
 
 
 class Plain(Component):
-    """A register between two streams: no writes, no status."""
+    """A register between two streams, without writes and status."""
 
     def __init__(self):
         super().__init__({"i": In(stream.Signature(3)), "o": Out(stream.Signature(3))})

@@ -16,7 +16,7 @@ from .test_guards import Few, generated
 
 
 def leading_zeros(word):
-    """Counted by halves, the upper one a power of two."""
+    """Counted by halves; the upper half has a power of two of bits."""
     if len(word) == 1:
         return ~word
     upper = 1 << (len(word) - 1).bit_length() - 1
@@ -25,7 +25,10 @@ def leading_zeros(word):
 
 
 class Operations(Component):
-    """What Amaranth has, of a and b of a width and an amount c, signed and not; fields lie across words."""
+    """Amaranth's operations on a and b of a width and an amount c, signed and unsigned.
+
+    Fields lie across words.
+    """
 
     i: In(stream.Signature(data.StructLayout({"a": 64, "b": 64, "c": 7})))
     o: Out(stream.Signature(data.ArrayLayout(64, 26)))
@@ -68,7 +71,7 @@ class Operations(Component):
             m.d.sync += self.o.valid.eq(self.i.valid)
             m.d.sync += wide[60 - width // 2 :][:width].eq(a)
             m.d.sync += [place.eq(result) for place, result in zip(self.o.payload, results, strict=False)]
-            # Of a word, and of bits across words; the second one's halves are not the same word's.
+            # Of one word, and of bits across words. The halves of the second do not belong to the same word.
             m.d.sync += self.o.payload[24].eq(Cat(leading_zeros(a), leading_zeros((a >> c)[:width])))
             mixed = Mux(a[-1:].any(), leading_zeros(a[-1:]), 1 + leading_zeros(b[:1]))
             m.d.sync += self.o.payload[25].eq(Cat(leading_zeros(wide[50:107]), mixed))
@@ -85,7 +88,10 @@ class Operations(Component):
     ("width", "long"), [(33, 64), *(pytest.param(n, words.LONG, marks=pytest.mark.long) for n in (1, 64))]
 )
 def test_as_in_pysim(monkeypatch, width, long):
-    """Small numbers, those with all bits, and any, under stalls; operands of long expressions have names."""
+    """Small numbers, numbers with all bits, and random numbers, under stalls.
+
+    Operands of long expressions have names.
+    """
     monkeypatch.setattr(words, "LONG", long)
     rng = np.random.default_rng(width)
     numbers = rng.integers(0, 1 << 64, (2, 200), dtype=np.uint64)
@@ -96,7 +102,7 @@ def test_as_in_pysim(monkeypatch, width, long):
 
 
 def test_templates_are_gone(monkeypatch):
-    """But for operations of more than 64 bits, which are CXXRTL's; then the text keeps its header."""
+    """CXXRTL's templates are only left in operations of more than 64 bits. Then the text keeps its header."""
     operation, header = re.compile(r"\b\w+_[us]+<\d+>\(|reduce_|logic_"), "#include <cxxrtl/cxxrtl.h>"
     wide = plain_words(generated(Operations(24), monkeypatch))
     assert set(operation.findall(wide)) == {"xor_uu<150>("}
@@ -107,7 +113,7 @@ def test_templates_are_gone(monkeypatch):
 
 
 def test_leading_zeros_are_one_operation(monkeypatch):
-    """Of one word; a choice between halves of two words stays a choice."""
+    """Leading zeros of one word. A choice between halves of two words stays a choice."""
     text = plain_words(generated(Operations(24), monkeypatch))
     assert re.search(r"leading_zeros\(\(p_\w+\.data\[0\]\), 24\)|leading_zeros\(.*, 24\)", text)
     assert re.search(r"leading_zeros\(.*, 57\)", text)

@@ -1,4 +1,4 @@
-"""Frames with vertex colours and textures through RTL: the model's pixels, and float64 within its bound."""
+"""Frames with vertex colours and textures through RTL: the model's pixels, within the bound of float64."""
 
 from dataclasses import replace
 
@@ -27,7 +27,7 @@ GLOSSY = Material((0.1,) * 3, (0.6,) * 3, (0.3,) * 3, 50)
 
 
 def floor():
-    """Two triangles at a grazing angle, with vertex colours and texture coordinates over four images."""
+    """Two triangles at a grazing angle, with vertex colours, and texture coordinates over four images."""
     corners = np.array([(x, 0.0, z) for z in (-3, 3) for x in (-1, 1)])
     normals = normalise(corners * (0.1, 0, 0) + (0, 1, 0))
     coordinates = corners[:, ::2] * (1, 0.5)
@@ -41,7 +41,7 @@ def floor():
 
 
 def scene_of(size):
-    """The floor in perspective, of a tinted material that emits light, with a texture of several levels."""
+    """The floor in perspective, with a tinted material that emits light, and a texture of several levels."""
     mesh = floor()
     texture = Texture(np.random.default_rng(4).random((8, 8, 3)))
     camera = Camera.framing(mesh.vertices, (0.2, 0.3, 1), projection="perspective")
@@ -52,7 +52,7 @@ def scene_of(size):
 @pytest.mark.long
 @pytest.mark.parametrize(("engine", "size"), [("pysim", (24, 18)), ("cxxrtl", (320, 240))])
 def test_colours_times_texels(engine, size):
-    """The pixels of the model, half an LSB from float64."""
+    """Pixels equal the model's, and are half an LSB from float64."""
     scene = scene_of(size)
     frame = blysk.render(scene, engine=engine, transfer="linear")
     design = frame.design
@@ -67,7 +67,10 @@ def test_colours_times_texels(engine, size):
 
 @pytest.mark.long
 def test_texels_outside_and_holes():
-    """Texels come after random numbers of cycles, and alpha makes holes: the frame of texels inside."""
+    """Texels come after random numbers of cycles, and alpha makes holes.
+
+    The frame equals that of texels inside.
+    """
     scene = scene_of((24, 18))
     alpha = np.indices((8, 8)).sum(axis=0) % 2
     texture = replace(scene.material.texture, alpha=alpha, filter="nearest", mipmapped=False)
@@ -80,7 +83,7 @@ def test_texels_outside_and_holes():
     dropped = expected.raster.dropped
     assert frame.figures["counts"]["cut_out_pixels"] == dropped > 20
     assert f"their alpha is under the cutoff: {dropped}" in str(frame)
-    # Four cycles a texel on average, in place of a single cycle.
+    # A texel takes four cycles on average, in place of a single cycle.
     assert frame.figures["cycles_per_pixel"] > 3
 
 
@@ -99,7 +102,7 @@ def test_render_of_a_mesh_with_colours():
     ("projection", "style"), [("perspective", "throughput"), ("orthographic", "compact")]
 )
 def test_colours_times_texels_by_triangles(projection, style):
-    """The pixels of the model, and half an LSB from float64, by hardware geometry."""
+    """With hardware geometry pixels equal the model's, and are half an LSB from float64."""
     scene = scene_of((24, 18))
     scene = replace(scene, camera=replace(scene.camera, projection=projection))
     options = {"geometry": "hardware", "transfer": "linear", "style": style}

@@ -1,4 +1,4 @@
-"""Turntables: where the camera goes, who draws the frames, and that they are those drawn one by one."""
+"""Turntables: the way of the camera, the executors, and frames that equal those drawn one by one."""
 
 import multiprocessing
 import random
@@ -86,7 +86,7 @@ def test_equal_distance_shows_all_of_the_mesh_from_every_side(projection):
         share = np.abs(places[:, :2] / [400, 300] - 0.5).max()
         assert share <= 0.45 + 1e-9
         fills.append(share)
-    # One at least fills the picture up to its margin, or all could stand nearer.
+    # At least one frame fills the picture up to its margin. Otherwise all could be nearer.
     if projection == "orthographic":
         assert max(fills) == pytest.approx(0.45)
 
@@ -112,7 +112,7 @@ def test_frames_come_in_any_order_and_none_twice():
         for index, result in render_frames(FrameExecutor(submit, 3, "threads"), range(40)):
             assert result == index * 10
             done.append(index)
-            # Two a worker under way, and no more: the memory holds no more.
+            # Two tasks a worker are under way, and no more, because the memory holds no more.
             assert len(waiting) - len(done) <= 6
     assert sorted(done) == list(range(40))
     assert waiting == list(range(40))
@@ -208,7 +208,7 @@ def test_a_process_that_dies(animation, cameras):
     children = set(multiprocessing.active_children())
     with pytest.raises(InputError, match=r"--jobs 1: a process died, .*; use fewer jobs"):
         killed()
-    # The pool itself reaps what was killed while it was being told.
+    # The pool itself reaps a process that was killed while the pool was sending to it.
     deadline = time.monotonic() + 20
     while set(multiprocessing.active_children()) != children and time.monotonic() < deadline:
         time.sleep(0.05)
@@ -231,7 +231,7 @@ def scheduler():
 @pytest.mark.long
 @pytest.mark.parametrize("who", [pytest.param("processes", marks=pytest.mark.ci), "cluster"])
 def test_frames_are_those_drawn_singly(animation, cameras, singly, request, who):
-    """By two workers, in an order of its own; no process is left."""
+    """Two workers draw in an order of their own. No process is left."""
     order = [3, 0, 4, 2, 1]
     address = who == "cluster" and request.getfixturevalue("scheduler").scheduler_address
     children = set(multiprocessing.active_children())
@@ -277,7 +277,7 @@ def test_an_error_on_a_cluster_is_that_of_the_frame(animation, scheduler):
 
 
 def test_the_same_process_draws_the_same(animation, cameras, singly):
-    """What a worker does, without one."""
+    """The work of a worker, without a worker."""
     for index in (1, 0):
         assert_the_same(render_frame(animation, cameras[index]), singly[index])
 
@@ -286,7 +286,7 @@ def test_the_same_process_draws_the_same(animation, cameras, singly):
 
 
 def test_gif(tmp_path):
-    """Up to 256 colours are kept to the bit; every frame and its time are there."""
+    """Up to 256 colours are kept to the bit. Every frame and its time are there."""
     rng = np.random.default_rng(6)
     colors = rng.integers(0, 256, (200, 3), dtype=np.uint8)
     images = colors[rng.integers(0, 200, (4, 30, 40))]

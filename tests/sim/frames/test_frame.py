@@ -84,7 +84,7 @@ def test_frame_is_the_model_after_a_depth_test(simulator):
     depth = corners[:, 0, 2] - ((place - corners[:, 0, :2]) * slope).sum(axis=-1)
     expected = np.empty((scene.height, scene.width, 3), dtype=np.uint8)
     expected[...] = np.rint(np.multiply(BACKGROUND, 255))
-    # The farthest is written first. Where two lie at one depth the lower triangle wins.
+    # The farthest fragment is written first. At equal depths the triangle with the lower number wins.
     order = np.lexsort((-cut.triangle[cut.span], -np.round(depth, 9)))
     expected[pixels.y[order], pixels.x[order]] = pixels.color[order]
     assert np.array_equal(frame.image, expected)
@@ -103,8 +103,8 @@ def test_engines_give_the_same_frame(simulator):
 @pytest.mark.parametrize("mesh", ["2000", "teapot992"])
 @pytest.mark.parametrize(("exponent", "bound"), [(1, 1.0), (10, 1.0), (100, 1.0), (1000, 1.7)])
 def test_arithmetic_error(simulator, mesh, exponent, bound):
-    # Rounding is 0.5. The highlight, 0.6 * 255 LSB high, has a slope of at most the exponent: at 1000, one
-    # step of a unit vector, 2**-17, in the cosine is 1.2 LSB.
+    # Rounding is 0.5. The highlight is 0.6 * 255 LSB high, and its slope is at most the exponent. At 1000, a
+    # step of a unit vector, 2**-17, in the cosine makes 1.2 LSB.
     scene = scene_of(mesh, (160, 120), exponent)
     frame = simulator.render(scene)
     assert frame.out_of_range_spans == 0
@@ -115,13 +115,13 @@ def test_arithmetic_error(simulator, mesh, exponent, bound):
     span, t = cut.span, cut.offset / np.maximum(cut.length[cut.span] - 1, 1)
     normals = interpolate("quadratic", cut.normal_left[span], cut.normal_right[span], t)
     cosines = normals @ np.transpose([light.direction for light in LIGHTS])
-    # On the terminator the sign of N.L decides over the highlight.
+    # On the terminator the sign of N.L decides about the highlight.
     terminator = cut.visible & (np.abs(cosines).min(axis=-1) < 2.0**-15)
     shown = cut.pixel[cut.visible & ~terminator]
     assert len(shown) > 3000
     assert np.count_nonzero(terminator) <= 5
     assert error[shown].max() <= bound
-    # The rest of the figures are of the same frame.
+    # The other figures are of the same frame.
     result = compare(scene, DESIGN, frame)
     assert result.arithmetic_error.max_lsb == error[cut.pixel[cut.visible]].max()
     assert result.arithmetic_error.p999_lsb <= result.arithmetic_error.max_lsb
@@ -138,7 +138,7 @@ def test_no_light_leaves_the_ambient(simulator):
 
 @pytest.mark.long
 def test_unused_lights_are_black(simulator):
-    # One light of three, against a simulator that has one only.
+    # One light of three, against a simulator with a single light.
     scene = scene_of("240", (24, 18), lights=LIGHTS[:1])
     single = FrameSimulator(preset(model="cosquad", lights=1), "pysim").render(scene)
     assert np.array_equal(single.image, simulator.render(scene).image)
@@ -150,7 +150,10 @@ def test_too_many_lights(simulator):
 
 
 def test_light_straight_behind(simulator):
-    """``L = -V`` has no half-way vector: no specular light, and none is diffuse on what faces the viewer."""
+    """``L = -V`` has no half-way vector.
+
+    There is no specular light, and no diffuse light where the surface faces the viewer.
+    """
     base = scene_of("500")
     behind = Light(tuple(-np.array(base.camera.viewer)))
     scene = dataclasses.replace(base, lights=(behind,))
@@ -197,7 +200,7 @@ def test_one_pixel(simulator):
 
 
 def test_frames_one_after_the_other(simulator):
-    """A run starts from power-up: nothing of the frame before is left, in whatever order they come."""
+    """A run starts from power-up. Nothing of the frame before is left, in whatever order the frames come."""
     scenes = [scene_of("500"), scene_of("240", (30, 40), 7, LIGHTS[:2]), scene_of("500", lights=())]
     first = [simulator.render(scene) for scene in scenes]
     again = [simulator.render(scene) for scene in reversed(scenes)][::-1]
@@ -250,9 +253,9 @@ MATERIALS = (
 @pytest.mark.long
 @pytest.mark.parametrize("engine", ["cxxrtl", "pysim"])
 def test_frame_of_three_materials(engine):
-    """Each pixel is that of a frame in its triangle's material alone, by the bit-accurate model.
+    """By the bit-accurate model each pixel equals that of a frame with its triangle's material alone.
 
-    The materials are scattered over the triangles: the spans are in another order than without.
+    The materials are scattered over the triangles, so the spans are in another order than without materials.
     """
     several = preset(model="cosquad", lights=1, materials=3)
     lone = scene_of("240", (40, 30) if engine == "cxxrtl" else (20, 15), lights=LIGHTS[:1])
@@ -277,7 +280,7 @@ def test_frame_of_three_materials(engine):
         own = owner == index
         assert np.array_equal(frame.image[own], image.reshape(frame.image.shape)[own])
     assert (frame.image[owner < 0] == np.rint(np.multiply(BACKGROUND, 255))).all()
-    # And the figures are those of a frame in its own materials.
+    # The figures are also those of a frame with its own materials.
     result = compare(scene, several, frame)
     assert result.arithmetic_error.max_lsb <= 1
     in_one = dataclasses.replace(scene, material=(MATERIALS[0],) * 3)
@@ -293,7 +296,10 @@ def test_other_numbers_of_materials(simulator):
 @pytest.mark.long
 @pytest.mark.parametrize("exponent", [10, 1000])
 def test_point_light_and_near_viewer(exponent):
-    """Within an LSB of L, H and N at every pixel; the light is as near as the pot is large."""
+    """The frame is within an LSB of the frame with L, H and N at every pixel.
+
+    The light is as near as the pot is large.
+    """
     mesh = teapot(1000)
     scene = Scene(
         mesh,

@@ -37,7 +37,7 @@ def in_rgb(path):
 
 
 def test_pixels_come_back_from_every_format_or_it_is_told(tmp_path):
-    """All that Pillow can write: exact without a word, or not exact with the largest change, or refused."""
+    """Every format of Pillow is exact without a message, or names the largest change, or is refused."""
     Image.init()
     image, _ = frames(31, 300)
     held = {"AVIF", "BMP", "DDS", "DIB", "GIF", "JPEG", "JPEG2000", "PCX", "PNG", "PPM", "QOI", "SGI", "TGA"}
@@ -79,7 +79,7 @@ def test_few_colours_come_back_from_gif(tmp_path):
     [
         ("a.xyz", "the suffix .xyz is not a picture format"),
         ("a", "the name has no suffix"),
-        ("a.fli", "the suffix .fli is not a picture format"),  # Pillow reads it only
+        ("a.fli", "the suffix .fli is not a picture format"),  # Pillow only reads this format.
     ],
 )
 def test_suffix(tmp_path, name, reason):
@@ -122,7 +122,7 @@ def test_wrong_frame(tmp_path, image):
 
 @pytest.mark.parametrize(("height", "width"), [(1, 1), (16, 16), (37, 211), (300, 640), (3, 4095)])
 def test_panels_are_the_frames(tmp_path, height, width):
-    """Both frames stand in the picture untouched, side by side, and all text has a white border."""
+    """Both frames stand in the picture unchanged, side by side. All text has a white border."""
     simulated, golden = frames(height, width)
     path = tmp_path / "a.png"
     write_comparison(path, simulated, golden, title="A title", subtitle="exponent 20")
@@ -138,12 +138,13 @@ def test_panels_are_the_frames(tmp_path, height, width):
 
 
 def test_error_map(tmp_path):
-    """The map is monotonic in the largest channel error, which is taken from the golden frame unrounded."""
+    """The colour of the map rises with the largest channel error, which is taken from the unrounded golden
+    frame."""
     golden = np.full((16, 16, 3), 100.25 / 255)
     simulated = np.full((16, 16, 3), 100, dtype=np.uint8)
     simulated[:, 4:8, 0] = 102  # 1.75 LSB, in one channel
     simulated[:, 8:12, 1] = 97  # 3.25 LSB, below
-    simulated[:, 12:] = 104  # 3.75 LSB, in all
+    simulated[:, 12:] = 104  # 3.75 LSB, in all channels
     path = tmp_path / "a.png"
     write_comparison(path, simulated, golden, title="t")
     picture = read(path)
@@ -153,7 +154,7 @@ def test_error_map(tmp_path):
     panel = picture[row : row + 16, third : third + 16]
     bands = [panel[:, 4 * k : 4 * k + 4] for k in range(4)]
     assert all((band == band[0, 0]).all() for band in bands)
-    # The scale below the map holds the same colours at 0.25, 1.75, 3.25 of 3.75 and at its end.
+    # The scale below the map has the same colours at 0.25, 1.75, 3.25 of 3.75 and at its end.
     bar = next(
         line for line in picture[row + 20 :] if all((line == band[0, 0]).all(axis=1).any() for band in bands)
     )
@@ -165,7 +166,7 @@ def test_error_map(tmp_path):
 
 
 def test_equal_frames(tmp_path):
-    """Without any error the scale ends at 1 LSB, and the map is all of the colour at 0."""
+    """Without any error the scale ends at 1 LSB, and all of the map has the colour of 0."""
     simulated = np.full((16, 16, 3), 100, dtype=np.uint8)
     write_comparison(tmp_path / "a.png", simulated, simulated / 255.0, title="t")
     picture = read(tmp_path / "a.png")
@@ -211,7 +212,7 @@ def test_matplotlib_is_not_imported_before_it_is_needed():
 
 @pytest.mark.parametrize("title", ["茶壶", "a\x07b", "\udced\udca0", "हिन्दी", "a$b_{"])
 def test_a_title_that_the_font_lacks(tmp_path, title):
-    """No warning of Matplotlib's, which tests make an error, and no other."""
+    """There is no warning of Matplotlib, which tests make an error, and no other warning."""
     simulated, golden = frames(6, 8)
     write_comparison(tmp_path / "a.png", simulated, golden, title=title)
     assert read(tmp_path / "a.png").size

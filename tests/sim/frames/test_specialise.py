@@ -48,7 +48,7 @@ def pixels_of(scene, design):
 
 
 def fitted(scene, full):
-    """A pipeline fitted to a scene, with the same frame by the bit-accurate models.
+    """A pipeline fitted to a scene. The bit-accurate models draw the same frame.
 
     Spans of merged materials may come in another order.
     """
@@ -72,7 +72,7 @@ def reasons(special):
 
 
 def test_vectors_keep_lights_and_highlights():
-    """Vectors depend on both: without one of them a pixel of this frame changes."""
+    """Vectors depend on lights and on highlights. Without one of them a pixel of this frame changes."""
     matt = replace(CLAY, specular=(0, 0, 0))
     scene = scene_of(matt, size=(160, 120), mesh=teapot(992))
     full = full_of(scene, method="quotient", model="blinn", gate=False)
@@ -85,7 +85,7 @@ def test_vectors_keep_lights_and_highlights():
 
 
 def test_everything_is_needed():
-    """Two materials that differ, coloured light, highlights: the widths alone are smaller."""
+    """Two different materials, coloured light and highlights: only the widths become smaller."""
     mesh = teapot(2000)
     mesh = replace(mesh, material=np.arange(len(mesh.faces)) % 2)
     scene = scene_of((CLAY, replace(CLAY, exponent=9)), (KEY, FILL), mesh=mesh)
@@ -109,7 +109,7 @@ def test_no_specular_path(style):
 
 
 def test_no_highlight_by_the_gate():
-    """A light from behind: its half-way vector is far from every normal."""
+    """The light is behind, so its half-way vector is far from every normal."""
     scene = scene_of(replace(CLAY, exponent=500), (Light((0.3, 0.3, -1)),), mesh=FLOOR)
     special = fitted(scene, full_of(scene))
     assert reasons(special)["specular"] == "no specular path: the gate proves that no span holds a highlight"
@@ -151,7 +151,7 @@ def test_equal_materials():
 
 
 def test_black_lights():
-    """No span is cut for a light that is off; one that is on counts, even where nothing shows it."""
+    """No span is cut for a light that is off. A light that is on counts, also if nothing shows it."""
     scene = scene_of(lights=(KEY, BLACK, FILL))
     special = fitted(scene, full_of(scene))
     assert reasons(special)["lights"] == "1 of 3 lights: they light nothing"
@@ -162,7 +162,7 @@ def test_black_lights():
 
 
 def test_factors_of_lights():
-    """The factor of a light that fades goes with it, and all of them with the specular path."""
+    """The factor goes with its fading light, and all factors go with the specular path."""
     lamp = Light(position=(1, 2, 3), attenuation=(1, 1, 0))
     scene = scene_of(lights=(BLACK, KEY, lamp), size=(60, 50))
     full = preset("chord-local", "cosquad", 3, factors=(0, 2))
@@ -173,7 +173,10 @@ def test_factors_of_lights():
 
 
 def test_a_light_that_is_off_costs_nothing():
-    """No span more, and in the compact style no cycle, in a pipeline that has it: its terms are 0."""
+    """A light that is off adds no span, and in the compact style no cycle, in a pipeline that has it.
+
+    Its terms are 0.
+    """
     design, found = preset("quadratic", "blinn", lights=2, style="compact"), []
     for lights in ((KEY,), (KEY, BLACK), (KEY, FILL)):
         scene = scene_of(lights=lights, size=(60, 50))
@@ -190,7 +193,7 @@ def test_a_light_that_is_off_costs_nothing():
 
 
 def test_methods_that_no_gate_serves():
-    """Spans that are cut by their error are not cut by a light that is off."""
+    """A light that is off does not cut spans that are cut by their error."""
     scene = scene_of(replace(CLAY, exponent=400), (KEY, BLACK, FILL))
     for method in ("chord-local", "quadratic-published", "renormalise"):
         special = fitted(scene, preset(method, "cosquad", lights=3))
@@ -213,7 +216,7 @@ def test_no_light_at_all(material, lights):
 
 
 def test_albedo():
-    """Texture, tint and emission tell materials apart. Tints need specular light."""
+    """Texture, tint and emission distinguish materials. Tints need specular light."""
     mesh = replace(FLOOR, coordinates=FLOOR.vertices[:, ::2], material=np.array([0, 1]))
     grey = Material(0.1, 0.5, 0.3, 30)
     images = [Texture(np.random.default_rng(seed).random((4, 4, 3))) for seed in (1, 2)]
@@ -259,7 +262,7 @@ def test_widths():
 
 @pytest.mark.long
 def test_shorter_words():
-    """Narrow and short spans; the pixels change by a step at most, and cost less."""
+    """Narrow and short spans: pixels change by at most a step, and the pipeline costs less."""
     for mesh in (teapot(2000), FLOOR):
         scene = scene_of(size=(100, 80), mesh=mesh)
         full = full_of(scene, method="chord-local")
@@ -279,7 +282,7 @@ def test_shorter_words():
 
 
 def test_frames_of_a_turntable():
-    """What any of them needs stays."""
+    """A part that any frame needs stays."""
     near, far = scene_of(), scene_of()
     out_of_range = Camera.framing(near.mesh.vertices * 4, (0.4, 0.5, 1), "perspective", 1.2)
     far = replace(far, camera=out_of_range)
@@ -289,7 +292,7 @@ def test_frames_of_a_turntable():
 
 
 def test_nothing_on_the_picture():
-    """No span: no highlight either, and the least of every width."""
+    """Without spans there is no highlight either, and every width is the least."""
     mesh = teapot(200)
     away = Camera.framing(np.add(mesh.vertices, (100.0, -100.0, 0.0)), (0.4, 0.5, 1), "perspective", 1.0)
     scene = replace(scene_of(mesh=mesh), camera=away)
@@ -304,7 +307,7 @@ def test_default_is_that_of_the_presets():
 
 @pytest.mark.long
 def test_simulated_frame():
-    """The RTL of the smaller pipeline draws the frame of the full one."""
+    """The RTL of the smaller pipeline draws the frame of the full pipeline."""
     scene = scene_of(Material((0.1,) * 3, (0.5,) * 3, (0.4,) * 3, 30), (KEY, BLACK), size=(120, 90))
     special = specialise(scene, full_of(scene))
     assert {"lights", "exponent", "grey", "x_bits", "y_bits", "length_bits"} <= set(reasons(special))

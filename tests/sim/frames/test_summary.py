@@ -1,4 +1,4 @@
-"""Figures of many frames; those of one are held against a whole run by the command line's tests."""
+"""Figures of many frames. Tests of the command line compare the figures of one frame with a whole run."""
 
 import math
 
@@ -62,7 +62,7 @@ def line(lines, name):
 
 @pytest.mark.parametrize("model", ["ggx", "phong_coplanar", "blinn", "cosquad"])
 def test_the_reference_is_the_one_that_was_used(model):
-    """A lobe is held against its own model; every other model against Blinn's power as well."""
+    """A lobe is compared with its own model, and every other model also with Blinn's power."""
     target = "blinn" if model == "cosquad" else model
     short = list(short_lines(figures(model, target)))
     said = line(short, "error")
@@ -83,7 +83,7 @@ def test_errors_say_their_space(lines, transfer, space):
 
 @pytest.mark.parametrize("lines", [short_lines, frame_lines])
 def test_what_the_error_leaves_out_is_told(lines):
-    """The bound is a bound, the measured figure is the largest, and the pixels between are counted."""
+    """The line names the bound, the largest measured error, and the number of pixels that both leave out."""
     told = list(lines(figures("blinn", "blinn")))
     text = "\n".join(told)
     assert "bound 0.92" in text

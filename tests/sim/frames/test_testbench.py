@@ -1,4 +1,4 @@
-"""The bench that a user takes away: what is in the folder; that it passes, and fails, by itself."""
+"""The bench that a user takes away: its folder, and that it passes, or fails, by itself."""
 
 import ast
 import csv
@@ -44,7 +44,7 @@ def folder(made, tmp_path):
 
 @pytest.fixture
 def run(tmp_path):
-    """Run a folder where modules with the names of the project's layers only fail."""
+    """Run a folder in an environment where modules with the names of the project's layers fail."""
     if find_spec("cocotb") is None:
         pytest.skip("the Python package cocotb is not installed")
     elsewhere = tmp_path / "elsewhere"
@@ -70,7 +70,7 @@ def run(tmp_path):
 
 
 def declared(text):
-    """Ports of the top module, their widths."""
+    """Ports of the top module, and their widths."""
     top = text[re.search(r"^module ", text, re.MULTILINE).start() : text.index("endmodule")]
     found = re.findall(r"^  (?:input|output) (?:\[(\d+):0\] )?(\w+);", top, re.MULTILINE)
     return {port: int(high or 0) + 1 for high, port in found}
@@ -95,7 +95,7 @@ def rows(path):
     ids=str,
 )
 def test_columns_are_the_ports(design):
-    """Every port but those of the control, once, with codes that fit it."""
+    """Every port except those of the control occurs once, with codes that fit the port."""
     unit = ShadingPipelineUnit(design)
     ports = declared(emit(unit, "core"))
     tables = vectors(unit)
@@ -108,7 +108,7 @@ def test_columns_are_the_ports(design):
 
 
 def test_frame_shows_every_light_and_material():
-    """Pixels change with each; one span is empty."""
+    """Pixels change with each light and material. One span is empty."""
     design = preset("quadratic", "cosquad", lights=3, materials=4)
     spans, constants, pixels = teapot_frame(design)
     assert np.flatnonzero(spans.length == 0).tolist() == [0]
@@ -143,7 +143,7 @@ def test_what_is_in_the_folder(made):
 
 @pytest.mark.long
 def test_imports_nothing_of_the_project(made):
-    """The standard library and cocotb."""
+    """The bench imports only the standard library and cocotb."""
     for path in made.glob("*.py"):
         for node in ast.walk(ast.parse(path.read_text())):
             names = [alias.name for alias in node.names] if isinstance(node, ast.Import) else []
@@ -164,7 +164,7 @@ def test_an_empty_folder_will_do_and_verilog_in_a_file_too(made, tmp_path, capsy
 
 @pytest.mark.parametrize("kind", ["file", "full", "orphan"])
 def test_refuses_a_folder(tmp_path, capsys, kind):
-    """Nothing is written, and nothing that was there is touched."""
+    """Nothing is written, and existing files do not change."""
     folder = tmp_path / "there"
     if kind == "file":
         folder.write_text("mine\n")
@@ -208,7 +208,7 @@ def test_passes_in_both(run, tmp_path, simulator, options):
 @pytest.mark.long
 @pytest.mark.parametrize("simulator", ["icarus", "verilator"])
 def test_waves_are_written_after_a_run_without_them(run, folder, simulator):
-    """Each time: the model that a run leaves behind writes none."""
+    """Waves are written each time, also after a run whose model writes none."""
     for options in ([], ["--waves"], [], ["--waves"]):
         done = run(folder, simulator, *options)
         assert done.returncode == 0, done.stdout
@@ -236,7 +236,7 @@ def test_finds_one_bit_of_an_expected_pixel(run, folder):
     assert "PASS=0 FAIL=4" in done.stdout
 
 
-# Output, what stands in its place, and what the bench says. ``given`` is what the pipeline gives.
+# The output, its replacement, and the message of the bench. ``given`` is the output of the pipeline.
 PLANTS = {
     "changed": ("o_b", "given ^ waits", "pixel [0-9]+: changed while"),
     "withdrawn": ("o_valid", "given && cycles[3:0] != 0", "pixel [0-9]+: o_valid went low while"),
@@ -266,7 +266,7 @@ endmodule
 @pytest.mark.long
 @pytest.mark.parametrize("plant", PLANTS)
 def test_finds_faults_of_the_verilog(run, folder, plant):
-    """Planted in a module round the pipeline, which is left as it is."""
+    """The faults are in a module around the pipeline, which itself does not change."""
     path = folder / "blysk.v"
     text = path.read_text()
     output, fault, says = PLANTS[plant]

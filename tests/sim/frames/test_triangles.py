@@ -28,9 +28,11 @@ def simulator():
 @pytest.mark.long
 @pytest.mark.parametrize(("triangles", "back_faces"), [(200, "flip"), (1000, "cull")])
 def test_frame_is_the_model_s(simulator, triangles, back_faces):
-    """Picture and counters; no more cycles than setup or pixels of the triangles that are not dropped.
+    """Picture and counters equal the model's.
 
-    And at least one for each pixel, those behind others at the end included.
+    Cycles are at most the larger of setup and pixels of the drawn triangles.
+
+    They are at least one for each pixel, with hidden pixels at the end.
     """
     drawn = scene("teapot", size=SIZE, triangles=triangles, back_faces=back_faces)
     frame, model = simulator.render(drawn), triangle_frame(drawn, simulator.renderer)
@@ -49,7 +51,7 @@ def test_frame_is_the_model_s(simulator, triangles, back_faces):
 @pytest.mark.long
 @pytest.mark.parametrize(("style", "model"), [("throughput", "blinn"), ("compact", "phong")])
 def test_vectors(style, model):
-    """Of the quotient method: picture and counters are the model's; nothing is missed."""
+    """With the quotient method picture and counters equal the model's, and no piece misses its tolerance."""
     simulator = TriangleSimulator(Renderer(design(method="quotient", model=model, style=style)), SIZE)
     drawn = scene("teapot", size=SIZE, triangles=200)
     frame, model = simulator.render(drawn), triangle_frame(drawn, simulator.renderer)
@@ -60,7 +62,7 @@ def test_vectors(style, model):
 
 @pytest.mark.long
 def test_small_triangles_with_two_lanes():
-    """Every triangle of the teapot is sent: 1.1 cycles a shaded pixel at most."""
+    """Every triangle of the teapot is sent, and a shaded pixel takes at most 1.1 cycles."""
     size = 640, 480
     frame = TriangleSimulator(Renderer(design().built(top="render", setups=2)), size).render(
         scene("teapot", size=size, triangles=10_000)
@@ -71,7 +73,7 @@ def test_small_triangles_with_two_lanes():
 
 @pytest.mark.parametrize(("albedo", "row"), [(None, 4), ("colors,nearest", 10)])
 def test_a_high_triangle_may_be_silent_for_long(monkeypatch, albedo, row):
-    """A compact core walks its scanlines outside of the picture in as many cycles as there are attributes."""
+    """On a scanline outside of the picture a compact core takes as many cycles as there are attributes."""
     monkeypatch.setattr(TriangleSimulator, "_check", lambda simulator: None)
     renderer = Renderer(design(style="compact", albedo=albedo).built(top="render", style="compact"))
     high = TriangleSimulator(renderer, SIZE)
@@ -86,7 +88,7 @@ ENDS = [(1, 1), (1, 2), (2, 1), (1, 4095), (4095, 1), (4085, 3), (4086, 3), (3, 
 
 @pytest.mark.parametrize("size", ENDS)
 def test_sizes_at_their_ends(size):
-    """The triangles that check a new model lie in the grid and show pixels; scenes cover what they should."""
+    """The triangles that check a new model lie in the grid and show pixels. Scenes cover what they should."""
     renderer = Renderer(design())
     checks = renderer.compute(
         sample_triangles(renderer, size), FrameSettings.centred(*size), sample_constants(renderer.design)
@@ -110,7 +112,7 @@ def test_simulated_sizes_at_their_ends(size):
 
 @pytest.mark.long
 def test_two_sided(simulator):
-    """Back faces of a two-sided material are turned where others are left out."""
+    """Back faces of a two-sided material are turned, while others are left out."""
     drawn = scene("teapot", size=SIZE, triangles=200, back_faces="cull")
     mesh = replace(drawn.mesh, faces=drawn.mesh.faces[::2], material=drawn.mesh.material[::2])
     drawn = replace(drawn, mesh=mesh, material=replace(drawn.materials[0], two_sided=True))
@@ -138,7 +140,7 @@ def test_another_size_is_refused(simulator):
 
 @pytest.mark.long
 def test_a_wrong_model_is_found(monkeypatch):
-    """A simulator checks some triangles of its own before a scene's."""
+    """Before a scene's triangles, a simulator checks some triangles of its own."""
     renderer = Renderer(design())
     compute = Renderer.compute
 

@@ -1,4 +1,4 @@
-"""Executors of this machine and of a cluster: what they do and how they end."""
+"""Executors of this machine and of a cluster: their work and their end."""
 
 import multiprocessing
 import os
@@ -70,12 +70,12 @@ def test_workers_and_their_programs_end_with_a_killed_parent(tmp_path):
     with subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE) as parent:
         started = [int(parent.stdout.readline()) for _ in range(3)]
         os.kill(parent.pid, signal.SIGKILL)
-        # At once: the programs would end by themselves after 300 s.
+        # At once, because the programs would end by themselves after 300 s.
         deadline = time.monotonic() + 60
         while any(map(_runs, started)):
             assert time.monotonic() < deadline
             time.sleep(0.02)
-        # No more comes as nobody holds the pipe: neither the worker nor one of its programs.
+        # Reading ends when nobody holds the pipe: neither the worker nor one of its programs.
         assert parent.stdout.read() == b""
 
 

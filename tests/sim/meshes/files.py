@@ -1,4 +1,4 @@
-"""Mesh files of every kind as tests write them, and what every loaded mesh promises."""
+"""Mesh files of every kind for tests, and checks that every loaded mesh must pass."""
 
 import base64
 import json
@@ -29,7 +29,10 @@ RED, GREEN, BLUE = (1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)
 
 
 def put(path, content):
-    """Write text, bytes, a glTF document with its buffer, or what trimesh exports; the path as text."""
+    """Write text, bytes, a glTF document with its buffer, or what trimesh exports.
+
+    The result is the path as text.
+    """
     if isinstance(content, tuple) and path.suffix == ".glb":
         content = glb(*content)
     elif isinstance(content, tuple):
@@ -49,7 +52,10 @@ def load(path, content, **options):
 
 
 def check_refused(source, *words, content=None, **options):
-    """One line that names the file, says why and what to do, and holds the words; the line."""
+    """Check for one line that names the file, the reason and the remedy, and has the given words.
+
+    The result is the line.
+    """
     if content is not None:
         put(source, content)
     with pytest.raises(InputError) as refusal:
@@ -64,7 +70,7 @@ def check_refused(source, *words, content=None, **options):
 
 
 def loaded_or_refused(path):
-    """The mesh, or the one line that refuses it."""
+    """The mesh, or the line that refuses it."""
     try:
         return load_mesh(str(path)), None
     except InputError as refusal:
@@ -82,13 +88,13 @@ def with_normals(mesh, normals):
 
 
 def obj_of(vertices, faces):
-    """Text of an OBJ file; every bit of a coordinate."""
+    """Text of an OBJ file, with every bit of a coordinate."""
     lines = [f"v {x!r} {y!r} {z!r}" for x, y, z in np.asarray(vertices, dtype=float).tolist()]
     return "\n".join(lines + [f"f {' '.join(str(corner + 1) for corner in face)}" for face in faces])
 
 
 def gltf(primitives, blobs, accessors, nodes, **extra):
-    """A glTF document and its one buffer, each blob a view of its own."""
+    """A glTF document and its single buffer. Each blob has its own view."""
     buffer, views = b"", []
     for blob in blobs:
         views.append({"buffer": 0, "byteOffset": len(buffer), "byteLength": len(blob)})
@@ -116,7 +122,7 @@ def glb(document, buffer):
 
 
 def mesh_gltf(vertices=TRIANGLE, faces=(0, 1, 2), normals=None, nodes=None, uri=None, **extra):
-    """A document of one mesh, by default of one triangle, and its buffer, perhaps in a file of its own."""
+    """A document of one mesh, by default of one triangle, and its buffer, perhaps in a separate file."""
     blobs = [np.asarray(vertices, "<f4").tobytes(), np.asarray(faces, "<u4").tobytes()]
     accessors = [vectors(len(vertices), 0), indices(np.size(faces), 1)]
     attributes = {"POSITION": 0}
@@ -147,7 +153,10 @@ def base(*color, **other):
 
 
 def material_gltf(materials, primitives, nodes=None, normals=None):
-    """A strip of triangles, one a primitive, of the materials of these indices; None is for none."""
+    """A strip of triangles, one in each primitive, with the materials of these indices.
+
+    None is for no material.
+    """
     document, buffer = mesh_gltf(normals=normals)
     first = document["meshes"][0]["primitives"][0]
     of_each = [first if index is None else {**first, "material": index} for index in primitives]
@@ -161,13 +170,13 @@ def material_gltf(materials, primitives, nodes=None, normals=None):
 
 
 def strip(count):
-    """Triangles side by side, the middle of number k at x = 2 k + 1/3, as lines of an OBJ file."""
+    """Triangles side by side, as lines of an OBJ file. The middle of number k is at x = 2 k + 1/3."""
     lines = [f"v {2 * k + x} {y} 0" for k in range(count) for x, y in ((0, 0), (1, 0), (0, 1))]
     return "\n".join(lines) + "\n", [f"f {3 * k + 1} {3 * k + 2} {3 * k + 3}\n" for k in range(count)]
 
 
 def material_obj(names, library="a.mtl"):
-    """A `strip` as an OBJ file, each triangle of the material of its name."""
+    """A `strip` as an OBJ file, each triangle with the material of its name."""
     vertices, faces = strip(len(names))
     return f"mtllib {library}\n{vertices}" + "".join(
         f"usemtl {name}\n{face}" for name, face in zip(names, faces, strict=True)
@@ -175,7 +184,7 @@ def material_obj(names, library="a.mtl"):
 
 
 def by_position(loaded):
-    """Material of each triangle of a `strip`, None where it is missing, in order of its position."""
+    """Material of each triangle of a `strip`, or None, in order of its position."""
     corner = loaded.mesh.vertices[loaded.mesh.faces].min(axis=1)[:, 0]
     position = np.rint(corner / 2).astype(int)
     result = [None] * (position.max() + 1)
@@ -196,7 +205,7 @@ def volume(mesh):
 
 
 def check(loaded):
-    """What every loaded mesh and its materials promise."""
+    """Check what every loaded mesh and its materials must fulfil."""
     mesh = loaded.mesh
     assert len(mesh.faces) > 0
     assert np.isfinite(mesh.vertices).all()
@@ -205,7 +214,7 @@ def check(loaded):
     assert np.array_equal(np.unique(mesh.faces), np.arange(len(mesh.vertices)))
     assert mesh.faces.dtype == mesh.material.dtype == np.int64
     assert mesh.material.shape == (len(mesh.faces),)
-    # Each is used, and no two are equal but for the name.
+    # Each material is used, and no two are equal except for the name.
     assert np.array_equal(np.unique(mesh.material), np.arange(len(loaded.materials)))
     assert len({replace(m, name="") for m in loaded.materials}) == len(loaded.materials)
     return loaded

@@ -1,4 +1,4 @@
-"""glTF files with images and colours as tests write them."""
+"""glTF files with images and colours, for tests."""
 
 import io
 
@@ -22,13 +22,13 @@ def png(rows):
     return file.getvalue()
 
 
-# Red and mid grey over green and black.
+# Red and mid grey are above green and black.
 CHECKER = png([[[255, 0, 0], [128, 128, 128]], [[0, 255, 0], [0, 0, 0]]])
 GREY = ((128 / 255 + 0.055) / 1.055) ** 2.4
 
 
 def with_array(content, name, values, kind="f4", **accessor):
-    """A document, with an attribute for the vertices of its first mesh."""
+    """A document, with a further attribute for the vertices of its first mesh."""
     document, buffer = content
     values = np.asarray(values, "<" + kind)
     buffer += bytes(-len(buffer) % 4)
@@ -44,7 +44,7 @@ def with_array(content, name, values, kind="f4", **accessor):
 
 
 def textured(info=None, image=CHECKER, places=PLACES, texture=None, sampler=None, material=None, **factors):
-    """A triangle with a texture, its image in the buffer."""
+    """A triangle with a texture, whose image is in the buffer."""
     material = material or {}
     factors = {"metallicFactor": 0, "baseColorTexture": {"index": 0, **(info or {})}, **factors}
     content = material_gltf([{"pbrMetallicRoughness": factors, **material}], [0])

@@ -86,7 +86,7 @@ def test_bad_obj_colours(tmp_path, row, reason):
 
 
 def wood(folder, name="wood.png", pixels=((51, 102), (204, 255))):
-    """A grey image, its upper row first."""
+    """A grey image, with its upper row first."""
     Image.fromarray(np.array(pixels, np.uint8)).save(folder / name)
 
 
@@ -119,7 +119,7 @@ def test_obj_image(tmp_path, options, scale, offset, wrap, told):
     assert loaded.ignored == told
     (material,) = loaded.materials
     assert material.diffuse == (0.5, 0.5, 0.5)
-    # The upper row is first, and v counts down.
+    # The upper row is first, and v counts downwards.
     assert np.allclose(
         material.texture.texels[..., 0], [[LINEAR[51], LINEAR[102]], [LINEAR[204], 1]], atol=1e-6
     )
@@ -179,7 +179,10 @@ def test_obj_images_that_are_not_read(tmp_path):
 
 
 def test_obj_corners_keep_their_texture_coordinates(tmp_path):
-    """Two triangles share a side whose ends have other coordinates in each, in all forms of corners."""
+    """Two triangles share a side, and its ends have other coordinates in each.
+
+    All forms of corners are tried.
+    """
     wood(tmp_path)
     put(tmp_path / "a.mtl", "newmtl a\nmap_Kd wood.png\n")
     head = f"mtllib a.mtl\nusemtl a\n{CORNERS}v 1 1 0\nvn 0 0 1\n" + "".join(
@@ -229,7 +232,7 @@ def test_obj_materials_with_and_without_images(tmp_path):
 
 
 def test_obj_light_of_its_own(tmp_path):
-    """Ke is emission, unless an image says where; illum 0 shows Kd without light."""
+    """Ke is emission, unless it has an image. illum 0 shows Kd without light."""
     of_each = ("Ke 0.5 0 2", "Kd 1 0 0\nillum 0", "Ke 1\nmap_Ke c.png", "Ke 0 0 0\nKd 0 0 1")
     text = "".join(f"newmtl {name}\n{text}\n" for name, text in zip("abcd", of_each, strict=True))
     put(tmp_path / "a.mtl", text)
@@ -335,7 +338,7 @@ def test_ply_image(tmp_path, names):
 
 
 def test_ply_image_by_corners(tmp_path):
-    """As MeshLab writes it, here with two images, the second of which is missing."""
+    """A file as MeshLab writes it, here with two images. The second image is missing."""
     wood(tmp_path, "my wood.png")
     lists = "property list uchar float texcoord\nproperty int texnumber\n"
     text = ply_of(comment=IMAGE + "comment TextureFile b.png\n", face=lists, tail=" 6 0 0 1 0 .25 .75 0")
@@ -358,7 +361,7 @@ def test_ply_image_by_corners(tmp_path):
 
 
 def stl(attributes, head=b""):
-    """A strip of triangles of these attributes."""
+    """A strip of triangles with these attributes."""
     data = head.ljust(80) + struct.pack("<I", len(attributes))
     for k, attribute in enumerate(attributes):
         corners = np.add(TRIANGLE, (2 * k, 0, 0)).ravel()
@@ -391,7 +394,7 @@ def test_stl_colours(tmp_path, attributes, head, expected, told):
 
 
 def test_stl_colours_meet_at_a_smooth_edge(tmp_path):
-    """Two flat triangles of other colours share a normal at their side, and no colour."""
+    """Two flat triangles of different colours share a normal at their side, and no colour."""
     other = np.array([[1, 0, 0], [1, 1, 0], [0, 1, 0]])
     data = bytes(80) + struct.pack("<I", 2)
     for corners, attribute in ((np.array(TRIANGLE), 0x8000 | 31 << 10), (other, 0x8000 | 31)):

@@ -15,7 +15,7 @@ SHAPES = {1: "SCALAR", 3: "VEC3", 4: "VEC4"}
 
 
 def document_of(arrays, nodes=None, **extra):
-    """A document of arrays, and their buffer; rows of 4 bytes at least, as glTF has them."""
+    """A document of arrays, and their buffer. Rows have at least 4 bytes, as glTF demands."""
     views, accessors, buffer = [], [], b""
     for values, normalised in arrays:
         values = np.asarray(values)
@@ -63,14 +63,14 @@ def plain(**extra):
 
 
 def corners(loaded):
-    """Corners of the triangles, in order: what is drawn, however the vertices are numbered."""
+    """Corners of the triangles in order, which do not depend on the numbers of the vertices."""
     return loaded.mesh.vertices[loaded.mesh.faces]
 
 
 @pytest.mark.parametrize("kind", ["<i1", "<u1", "<i2", "<u2"])
 @pytest.mark.parametrize("normalised", [False, True])
 def test_quantised_positions(path, kind, normalised):
-    """glTF 2.0, section 3.6.2.2: f = c / (2**bits - 1), of signed ones max(c / (2**(bits-1) - 1), -1)."""
+    """glTF 2.0, section 3.6.2.2: f = c / (2**bits - 1), for signed numbers max(c / (2**(bits-1) - 1), -1)."""
     limits = np.iinfo(kind)
     whole = np.where(TETRAHEDRON > 0, limits.max, limits.min).astype(kind)
     whole[0] //= 3
@@ -88,7 +88,7 @@ def test_quantised_positions(path, kind, normalised):
 
 @pytest.mark.parametrize("kind", ["<i1", "<i2"])
 def test_quantised_normals(path, kind):
-    """Rounding to whole numbers is no fault of a file, and the direction is that of the numbers."""
+    """Rounding to whole numbers is no fault of a file. The direction is that of the numbers."""
     directions = TETRAHEDRON @ Rotation.from_rotvec([0.3, 0.2, 0.1]).as_matrix() / np.sqrt(3)
     whole = np.rint(directions * np.iinfo(kind).max).astype(kind)
     document, buffer = document_of([*PLAIN, (whole, True)], extensionsRequired=["KHR_mesh_quantization"])
@@ -115,7 +115,7 @@ def test_quantised_normals_that_are_no_unit_vectors_are_counted(path):
     ids=["strip", "fan"],
 )
 def test_strips_and_fans(path, mode, expected, indexed):
-    """Order of the corners as in glTF 2.0, section 3.7.2.1; trimesh leaves fans out."""
+    """The order of corners is that of glTF 2.0, section 3.7.2.1. trimesh leaves fans out."""
     points = np.array([[0, 0, 0], [1, 0, 0.1], [1, 1, 0.3], [0, 1, 0.4], [-1, 1, 0.9]])
     order = np.array([3, 1, 4, 0, 2]) if indexed else np.arange(5)
     document, buffer = document_of([(points.astype("<f4"), False), (order.astype("<u1"), False)])
@@ -140,7 +140,7 @@ def instances(**attributes):
 
 @pytest.mark.parametrize("kind", ["<f4", "<i2", "<i1"])
 def test_instances(path, kind):
-    """Vertices by T R S, of each instance; the matrices by SciPy."""
+    """Vertices by T R S, for each instance. SciPy makes the matrices."""
     turns = Rotation.from_rotvec([[0, 0, 0], [0, 0, 1.5], [2, 1, 0]])
     moves = np.array([[0, 0, 0], [5, 0, 0], [0, 7, 1]])
     sizes = np.array([[1, 1, 1], [1, 2, 3], [-1, 1, 1]])
@@ -244,7 +244,7 @@ def test_quantised_array_that_is_too_long_for_its_view(path):
 
 
 def test_draco(path):
-    """With the decoder, within its quantisation to 14 bits."""
+    """With the decoder, vertices are within its quantisation to 14 bits."""
     pytest.importorskip("DracoPy")
     trimesh = pytest.importorskip("trimesh")
     mesh = trimesh.Trimesh(TETRAHEDRON, FACES, process=False)

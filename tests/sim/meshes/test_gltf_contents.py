@@ -1,4 +1,5 @@
-"""What glTF files hold: read, told or refused by name; versions, scenes, sparse arrays, compressed views."""
+"""Contents of glTF files: read, told or refused by name; versions, scenes, sparse arrays, compressed
+views."""
 
 import numpy as np
 import pytest
@@ -37,7 +38,7 @@ def test_plain_data_beside_compressed_data_is_drawn(tmp_path, name):
     assert np.array_equal(load(tmp_path / "a.gltf", (document, buffer)).mesh.vertices, TRIANGLE)
     reason = f"it needs the extension {name}, which is not supported"
     check_refused(tmp_path / "b.gltf", reason, content=changed(compress(name, required=True)))
-    # A fallback that is not there.
+    # This fallback does not exist.
     document, _ = changed(compress(name))
     document["buffers"].reverse()
     document["buffers"][1]["uri"] = None
@@ -224,7 +225,7 @@ def test_gltf_materials_that_are_not_read_whole(tmp_path, material, told):
     document["extensionsRequired"] = used
     loaded = load(tmp_path / "a.glb", (document, buffer))
     assert loaded.ignored == ((f"of materials: {told}",) if told else ())
-    # Of no face.
+    # This belongs to no face.
     document, buffer = material_gltf([material, base(0, 0, 1, 1)], [1])
     assert load(tmp_path / "a.glb", (document, buffer)).ignored == ()
 
@@ -250,7 +251,7 @@ def test_required_extensions_are_known_by_name(tmp_path, name):
 @pytest.mark.parametrize("base_view", [True, False])
 @pytest.mark.parametrize("kind", [5121, 5123, 5125])
 def test_sparse_positions(tmp_path, base_view, kind):
-    """glTF 2.0, section 3.6.2.3: a few elements in place of those of the view, or of zeros."""
+    """glTF 2.0, section 3.6.2.3: a few elements replace those of the view, or zeros."""
     document, buffer = mesh_gltf()
     places = np.array([1, 2], {5121: "u1", 5123: "<u2", 5125: "<u4"}[kind]).tobytes()
     values = np.array([[3, 0, 0], [0, 4, 0]], "<f4").tobytes()
@@ -269,7 +270,7 @@ def test_sparse_positions(tmp_path, base_view, kind):
     assert mesh.vertices.tolist() == [[0, 0, 0], [3, 0, 0], [0, 4, 0]]
     sparse["count"] = 4
     check_refused(tmp_path / "a.glb", "the count of a sparse array", content=(document, buffer))
-    # Of a number's bits.
+    # By the bits of the number.
     sparse |= {"count": 1, "indices": {"bufferView": 3, "componentType": 5125}}
     check_refused(tmp_path / "a.glb", "a sparse array has an element over 2", content=(document, buffer))
 

@@ -53,7 +53,7 @@ def test_alpha_of_vertices_is_told_where_it_counts(tmp_path):
 
 @pytest.mark.parametrize(("kind", "scale"), [("f4", 1), ("u1", 255), ("u2", 65535)])
 def test_alpha_of_vertices_is_read_for_a_cutoff(tmp_path, kind, scale):
-    """White is no colour, and its alpha counts all the same."""
+    """White is no colour, and its alpha still counts."""
     for color, colors in (([1, 0, 0], 3), ([1, 1, 1], 0)):
         content = material_gltf([base(1, 1, 1, 0.9, alphaMode="MASK", alphaCutoff=0.25)], [0])
         values = np.array([[*color, 1], [*color, 0.2], [*color, 0.4]]) * scale
@@ -152,7 +152,7 @@ def test_colours_of_another_number_than_positions(tmp_path):
     document, buffer = with_array(mesh_gltf(), "COLOR_0", [[1, 0, 0]] * 3)
     del document["accessors"][-1]["bufferView"]
     check_refused(tmp_path / "a.glb", "its COLOR_0 has no data", content=(document, buffer))
-    # It is not made, only to be left out.
+    # The texture is not made, only told.
     document["accessors"][-1]["count"] = 3 * 10**7
     told = ("COLOR_0 of another number than positions",)
     assert load(tmp_path / "a.glb", (document, buffer)).ignored == told
@@ -173,13 +173,13 @@ def test_unused_vertices_may_have_any_colour(tmp_path):
 
 
 def test_welded_corners_keep_their_colours(tmp_path):
-    """A flat square of two triangles: normals are joined across the diagonal, colours are not."""
+    """A flat square of two triangles: normals are joined across the diagonal, and colours are not."""
     vertices = [[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 0, 0], [1, 1, 0], [0, 1, 0]]
     content = mesh_gltf(vertices=vertices, faces=range(6))
     colors = [RED, RED, GREEN, RED, BLUE, BLUE]
     loaded = check(load(tmp_path / "a.glb", with_array(content, "COLOR_0", colors)))
     mesh = loaded.mesh
-    # Of the two corners of the diagonal, the red ones are one vertex, and the others are two.
+    # At the corners of the diagonal, the red corners are one vertex, and the others are two.
     assert len(mesh.vertices) == 5
     found = {
         (*place, *color) for place, color in zip(mesh.vertices.tolist(), mesh.colors.tolist(), strict=True)
@@ -193,7 +193,10 @@ def test_welded_corners_keep_their_colours(tmp_path):
 
 
 def test_parts_without_colours_are_white(tmp_path):
-    """Two nodes of a coloured mesh, mirrored at one, and a part with a material and no colours."""
+    """Two nodes have a coloured mesh, which one of them mirrors.
+
+    A further part has a material and no colours.
+    """
     document, buffer = with_array(mesh_gltf(), "COLOR_0", [RED, GREEN, BLUE])
     plain = {"attributes": {"POSITION": 0}, "indices": 1, "material": 0}
     document["materials"] = [base(0, 0.5, 1, 1)]
@@ -201,7 +204,7 @@ def test_parts_without_colours_are_white(tmp_path):
     document["nodes"] = [{"mesh": 0}, {"mesh": 0, "scale": [-1, 1, 1]}, {"mesh": 1, "translation": [5, 0, 0]}]
     document["scenes"][0]["nodes"] = [0, 1, 2]
     loaded = check(load(tmp_path / "a.glb", (document, buffer)))
-    # A material of its own: the other has no colours.
+    # It has its own material, because the other part has no colours.
     assert [of.colored for of in loaded.materials] == [True, False]
     assert loaded.materials[1].diffuse == (0, 0.5, 1)
     for corner, color in zip(loaded.mesh.vertices.tolist(), loaded.mesh.colors.tolist(), strict=True):
@@ -278,7 +281,7 @@ def test_unlit(tmp_path):
 
 
 def test_specular_glossiness(tmp_path):
-    """The factors of the extension; the others are for programs that do not know it."""
+    """The factors are those of the extension. The other factors are for programs that do not know it."""
     factors = {"diffuseFactor": [0.5, 1, 0, 1], "specularFactor": [0.5, 0.25, 0], "glossinessFactor": 0.6}
     document, buffer = textured()
     glossy = {GLOSSY: {**factors, "diffuseTexture": {"index": 0}}}
@@ -291,7 +294,7 @@ def test_specular_glossiness(tmp_path):
     assert (material.diffuse, material.fresnel) == ((0.25, 0.5, 0), (0.5, 0.25, 0))
     assert material.roughness == pytest.approx(0.4)
     assert material.texture.texels[0, 0].tolist() == [1, 0, 0]
-    # What a texture says of the factors is not known.
+    # The effect of a texture on the factors is not known.
     glossy[GLOSSY]["specularGlossinessTexture"] = {"index": 0}
     loaded = load(tmp_path / "a.glb", (document, buffer))
     (material,) = loaded.materials

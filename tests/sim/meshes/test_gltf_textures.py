@@ -94,7 +94,7 @@ def test_places_of_images(tmp_path, kind, suffix):
     ],
 )
 def test_images_that_are_not_there_are_told(tmp_path, uri, told):
-    """As material files of OBJ are; the part is drawn in its own colour."""
+    """A missing image is told, as for material files of OBJ. The part is drawn in its own colour."""
     (tmp_path / "a.png").write_bytes(CHECKER)
     folder = tmp_path / "folder"
     (folder / "sub").mkdir(parents=True)
@@ -279,7 +279,7 @@ def test_an_image_is_read_once(tmp_path):
 
 
 def test_materials_with_alpha_and_without_share_texels(tmp_path):
-    """A tree has bark and leaves in an image."""
+    """The bark and leaves of a tree are in the same image."""
     document, buffer = textured(image=png([[[255, 0, 0, 255], [0, 255, 0, 9]]]))
     document["materials"].append({**document["materials"][0], "alphaMode": "MASK"})
     first = document["meshes"][0]["primitives"][0]
@@ -302,7 +302,7 @@ def test_alpha_of_an_image_is_told_where_it_counts(tmp_path, mode):
 
 
 def test_alpha_of_an_image_is_resampled_in_its_own_light(tmp_path):
-    """Three columns of alpha become four, as an image of a linear channel by Pillow does."""
+    """Three columns of alpha become four, as Pillow resamples an image with a linear channel."""
     codes = np.array([[10, 200, 90]])
     image = png(np.dstack([codes, codes, codes, codes]))
     loaded = load(tmp_path / "a.glb", textured(image=image, material={"alphaMode": "MASK"}))

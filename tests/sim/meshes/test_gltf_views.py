@@ -18,7 +18,7 @@ SQUARE = [[0, 0, 0], [1, 0, 0], [0, 1, 0], [1, 1, 0]]
 
 
 def lit(*lights, nodes=None):
-    """A square and lights, each with a node of its own."""
+    """A square and lights, each with its own node."""
     placed = nodes or [{} for _ in lights]
     placed = [node | {"extensions": {"KHR_lights_punctual": {"light": k}}} for k, node in enumerate(placed)]
     document, buffer = mesh_gltf(
@@ -86,7 +86,7 @@ def test_point_and_spot_lights(tmp_path):
     assert np.allclose(sun.color, (0, 0.1, 0))
     corners = np.array(SQUARE, dtype=float)
     assert np.allclose(point.factor(corners), 1)
-    # Twice as far, a quarter of the light.
+    # At twice the distance there is a quarter of the light.
     assert np.allclose(point.factor(np.array([[0.5, 0.5, math.sqrt(2) - 2 * math.sqrt(2.5)]])), 0.25)
     assert loaded.ignored == (UNIT,)
     one = load_mesh(str(tmp_path / "a.glb"), local=False)
@@ -98,7 +98,7 @@ def test_ranges(tmp_path):
     nodes = [{"translation": [0.5, 0.5, math.sqrt(2)]}] * 3
     lights = [{"type": "point", "range": reach} for reach in (10, 2, 1)]
     loaded = load(tmp_path / "a.glb", lit(*lights, nodes=nodes))
-    # 1 - (r/R)^4, with r^2 = 2.5; the last one ends before the square.
+    # 1 - (r/R)^4 with r^2 = 2.5. The last light ends before the square.
     weights = np.array([1 - 6.25 / 1e4, 1 - 6.25 / 16])
     assert np.allclose([light.color[0] for light in loaded.lights], weights / weights[0])
     assert loaded.ignored == ("2 ranges of lights", UNIT)
@@ -108,7 +108,7 @@ def test_most_lights(tmp_path):
     lights = [{"type": "directional", "intensity": k} for k in range(20)]
     loaded = load(tmp_path / "a.glb", lit(*lights))
     assert [light.color[0] for light in loaded.lights] == [k / 19 for k in range(4, 20)]
-    # The first is off.
+    # The first light is off.
     assert loaded.ignored == ("3 lights beside the brightest (16 fit)", UNIT)
     assert [light.color[0] for light in load_mesh(str(tmp_path / "a.glb"), lights=1).lights] == [1]
 
@@ -156,7 +156,7 @@ def test_cameras(tmp_path):
     assert (camera.position, camera.target, camera.up) == ((0.5, 0.5, 4), (0.5, 0.5, 0), (0, 1, 0))
     assert (camera.projection, camera.near) == ("perspective", 0.5)
     assert camera.field_of_view == pytest.approx(40)
-    # Turned, the camera at (4, 1/4, 1/2) looks along -x; the middle is 7/2 deep.
+    # After the turn the camera at (4, 1/4, 1/2) looks along -x. The middle is 7/2 deep.
     node = {"translation": [4, 0.25, 0.5], "rotation": TURNED, "scale": [3, 3, 3]}
     camera = load(tmp_path / "a.glb", seen(ORTHOGRAPHIC, node=node)).camera
     assert np.allclose(camera.target, (0.5, 0.25, 0.5))
@@ -165,7 +165,7 @@ def test_cameras(tmp_path):
     assert camera.near == pytest.approx(3.5e-3)
     plain = load_mesh(str(tmp_path / "a.glb"), camera=False)
     assert (plain.camera, plain.ignored) == (None, ())
-    # The mesh is behind it.
+    # The mesh is behind the camera.
     behind = load(tmp_path / "a.glb", seen(PERSPECTIVE, node={"translation": [0.5, 0.5, -4]})).camera
     assert np.allclose(behind.target, (0.5, 0.5, -8))
 

@@ -13,7 +13,7 @@ from blysk.sim.meshes.images import MAX_PIXELS, load_texture
 from blysk.sim.meshes.materials import Found
 from blysk.sim.meshes.refusal import Refused
 
-# Codes and their linear light, by the curve of IEC 61966-2-1 computed with other tools.
+# Codes and their linear light, computed by the curve of IEC 61966-2-1 with other tools.
 LINEAR = {0: 0.0, 1: 0.000303527, 51: 0.0331048, 128: 0.2158605, 188: 0.5028865, 255: 1.0}
 
 
@@ -37,7 +37,7 @@ def saved(image, kind, **options):
 
 
 def read(data, name="a.png", **options):
-    """The texture and what is told; no warning may leave."""
+    """The texture, and what is told. No warning may appear."""
     found = Found()
     return load_texture(data, name, found, **options), found.ignored
 
@@ -64,7 +64,7 @@ GREY = [[51] * 3, [128] * 3]
             RGB,
             ("alpha of images: a.png",),
         ),
-        # A profile and a curve of the file do not count.
+        # A profile and a curve in the file have no effect.
         (
             png([[51, 128]], 0, before=chunk(b"iCCP", b"x\0\0" + zlib.compress(b"damaged"))),
             GREY,
@@ -100,7 +100,7 @@ def test_jpeg_is_read_and_its_orientation_does_not_count():
     pixels[:, 8:] = 51
     texture, _ = read(saved(Image.fromarray(pixels), "JPEG", quality=100, subsampling=0, exif=exif))
     assert texture.texels.shape == (8, 16, 3)
-    # JPEG rounds twice: a code or two.
+    # JPEG rounds twice, by a code or two.
     assert np.abs(texture.texels[:, 2] - LINEAR[128]).max() < 0.02
     assert np.abs(texture.texels[:, 13] - LINEAR[51]).max() < 0.01
     grey, _ = read(saved(Image.fromarray(pixels[..., 0]), "JPEG", quality=100))
@@ -131,12 +131,12 @@ def test_other_sizes_are_resampled_and_told(width, height, to):
 
 
 def test_resampling_is_in_linear_light_and_follows_the_wrap():
-    # Halved: black and white are half of the light, not code 128.
+    # Black and white, halved, are half of the light, not code 128.
     row = np.zeros((1, 2 * LARGEST_TEXTURE), np.uint8)
     row[:, ::2] = 255
     texture, _ = read(saved(Image.fromarray(row), "PNG"))
     assert np.allclose(texture.texels, 0.5, atol=1e-6)
-    # Three texels as four: the first new centre, 1/8, is a twenty-fourth before the first old centre.
+    # Three texels become four. The first new centre, 1/8, is a twenty-fourth before the first old centre.
     data = png([[0, 0, 255]], 0)
     for wrap, share in (("repeat", 0.125), ("clamp", 0), ("mirror", 0)):
         texture, _ = read(data, wrap=(wrap, "repeat"))

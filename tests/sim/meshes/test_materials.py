@@ -1,4 +1,4 @@
-"""Materials of mesh files: what is read, what is told, what is refused, and the surfaces that follow."""
+"""Materials of mesh files: values that are read, told or refused, and the surfaces that follow."""
 
 import os
 import re
@@ -70,7 +70,7 @@ def test_obj_materials(tmp_path):
     loaded = check(load(tmp_path / "a.obj", text))
     red = FileMaterial("red", RED, (0.5, 0.25, 0.1), 96)
     grey = FileMaterial("grey # the paint", (0.5, 0.5, 0.5))
-    # Faces of no material, of one that says nothing, and of one that is not there, are all alike.
+    # Faces without a material, with an empty material, and with a missing material are all alike.
     nothing, matt = FileMaterial("none"), FileMaterial("matt", exponent=1)
     assert by_position(loaded) == [nothing, red, grey, nothing, red, nothing, matt]
     told = ("1 material name without a definition", "of materials: ambient colour (Ka), kd")
@@ -101,7 +101,7 @@ def test_spellings_of_material_files(tmp_path, statement, files):
     for name, text in files.items():
         put(tmp_path / name, text)
     vertices, faces = strip(3)
-    # o and g make no difference, nor does where they stand; a comment is no statement.
+    # o and g make no difference, wherever they stand. A comment is no statement.
     text = f"o whole\n{statement}\n{vertices}g x\nusemtl a\no 7\n{faces[0]}# usemtl a\n\tusemtl \tb\r\n"
     loaded = load(tmp_path / "a.obj", f"{text}g y\no 1\n{faces[1]}usemtl\n{faces[2]}")
     expected = [FileMaterial("a", RED), FileMaterial("b", GREEN), FileMaterial()]
@@ -109,7 +109,8 @@ def test_spellings_of_material_files(tmp_path, statement, files):
 
 
 def test_material_names_with_a_number_sign(tmp_path):
-    # What looks like a comment is part of the name, if there is such a material, else a comment.
+    # If a material has a name that looks like a comment, the text is part of the name. Otherwise it is a
+    # comment.
     put(tmp_path / "a.mtl", "newmtl Material #1\nKd 1 0 0\nnewmtl Material #2\nKd 0 1 0\nnewmtl c\nKd 0 0 1")
     loaded = load(tmp_path / "a.obj", material_obj(["Material #1", "Material #2", "c # the last"]))
     assert [material.diffuse for material in by_position(loaded)] == [RED, GREEN, BLUE]
@@ -120,7 +121,7 @@ def test_missing_material_files_are_told(tmp_path):
     assert loaded.materials == (FileMaterial("a"),)
     told = ("the material file 'no.mtl', which does not exist", "2 material names without a definition")
     assert loaded.ignored == told
-    # Many in a line.
+    # Many statements in a line.
     put(tmp_path / "99.mtl", "newmtl a\nKd 1 0 0\n")
     names = " ".join(f"{number}.mtl" for number in range(100))
     loaded = load(tmp_path / "a.obj", material_obj(["a"], names))
@@ -137,7 +138,7 @@ def test_gltf_materials(tmp_path, normals):
         base(0, 0, 1, 1, name="blue too"),
         base(1, 0.25, 0, 1),
     ]
-    # What a texture says of the factors is not known.
+    # The effect of a texture on the factors is not known.
     materials[5]["pbrMetallicRoughness"] |= {"metallicRoughnessTexture": {"index": 0}}
     loaded = check(
         load(tmp_path / "a.glb", material_gltf(materials, [5, None, 0, 2, 3, 4, 0], None, normals))
@@ -154,7 +155,10 @@ def test_gltf_materials(tmp_path, normals):
 
 
 def test_gltf_primitives_of_one_mesh(tmp_path):
-    """Points and lines among them, and the same mesh at a mirrored node: no part takes another's material."""
+    """Points and lines are among the primitives, and a mirrored node has the same mesh.
+
+    No part takes another's material.
+    """
     document, buffer = mesh_gltf()
     start = len(buffer)
     buffer += np.add(TRIANGLE, [2, 0, 0]).astype("<f4").tobytes()
@@ -180,7 +184,7 @@ def test_gltf_primitives_of_one_mesh(tmp_path):
 @pytest.mark.parametrize("stored", [True, False])
 @pytest.mark.parametrize("mirror", [False, True])
 def test_material_of_a_face_survives_what_is_done_to_the_mesh(tmp_path, stored, mirror):
-    """Octants in 8 materials: flat triangles dropped, creases cut, vertices welded, a node that mirrors.
+    """Octants have 8 materials; flat triangles are dropped, creases cut, vertices welded, and a node mirrors.
 
     Each triangle's material is known from the position of its middle.
     """
@@ -190,7 +194,7 @@ def test_material_of_a_face_survives_what_is_done_to_the_mesh(tmp_path, stored, 
     accessors, primitives = [vectors(len(sphere.vertices), 0)], []
     for index in range(8):
         own = sphere.faces[octant == index]
-        # Every second one is between triangles without area.
+        # Every second triangle is between triangles without area.
         own = np.stack([own, own[:, [0, 0, 1]]], axis=1).reshape(-1, 3)
         blobs.append(own.astype("<u4").tobytes())
         accessors.append(indices(own.size, index + 1))
@@ -222,7 +226,10 @@ def test_other_textures_and_missing_images_are_told(tmp_path):
 
 @pytest.mark.parametrize("suffix", [".obj", pytest.param(".glb", marks=pytest.mark.long)])
 def test_most_materials(tmp_path, suffix):
-    """`MAX_MATERIALS` load, one more is refused; equal ones count as one, and unused ones not at all."""
+    """`MAX_MATERIALS` materials load, and one more is refused.
+
+    Equal materials count once, and unused materials do not count.
+    """
     count, path = MAX_MATERIALS + 1, tmp_path / f"a{suffix}"
 
     def content(used, distinct):
@@ -360,7 +367,7 @@ _WORDS = st.sampled_from(["Kd", "Ks", "Ns", "newmtl", "a", "0.5", "1", "-1", "na
 @settings(max_examples=100, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(lines=st.lists(st.lists(_WORDS | st.text(max_size=5), max_size=5).map(" ".join), max_size=6))
 def test_any_material_file(tmp_path, lines):
-    """It gives a material in its ranges, or is refused in one line."""
+    """Any file gives a material in its ranges, or is refused in one line."""
     put(tmp_path / "a.obj", material_obj("a"))
     put(tmp_path / "a.mtl", "\n".join(["newmtl a", *lines]))
     loaded, refusal = loaded_or_refused(tmp_path / "a.obj")
@@ -373,7 +380,7 @@ def test_any_material_file(tmp_path, lines):
 
 @pytest.mark.parametrize("kind", [".mtl", ".glb", ".obj"])
 def test_damaged_materials(tmp_path, kind):
-    """Random bytes of the materials changed: a whole mesh, or a refusal in one line."""
+    """Random bytes of the materials are changed: the result is a whole mesh, or a refusal in one line."""
     rng = np.random.default_rng(20261122)
     put(tmp_path / "a.obj", material_obj("abc"))
     put(
@@ -421,7 +428,10 @@ def test_surfaces():
 
 
 def test_surfaces_of_factors():
-    """By the formulas of glTF's appendix B; options go before the file, the exponent before a roughness."""
+    """By the formulas of glTF's appendix B.
+
+    Options replace values of the file, and an exponent replaces a roughness.
+    """
     default = Material((0.08, 0.05, 0.03), (0.75, 0.42, 0.2), (0.6, 0.6, 0.6), 50)
     said = FileMaterial.of_metallic_roughness("a", (0.5, 0.0, 1.0), 0.25, 0.8, two_sided=True)
     (made,) = surfaces([said], default)
@@ -440,7 +450,7 @@ def test_surfaces_of_factors():
 
 
 def test_factors_of_obj(tmp_path):
-    """Pr and Pm in place of Ks and Ns."""
+    """Pr and Pm replace Ks and Ns."""
     put(
         tmp_path / "a.mtl",
         "newmtl a\nKd 1 0 0\nKs 1 1 1\nNs 9\nPr 0.25\nnewmtl b\nPm 1 # metal\nPr 0.5\nnewmtl c\nPm 0.5\n",
@@ -461,6 +471,6 @@ def test_a_scene_of_a_file(tmp_path):
     image = render(scene).image
     colors = [[0.0, 0.0, 1.0], [0.5, 0.5, 0.5], [1.0, 0.0, 0.0]]
     assert np.unique(image[image.any(axis=-1)].round(9), axis=0).tolist() == colors
-    # Left to right in the picture as in the strip.
+    # From left to right the picture has the order of the strip.
     thirds = np.split(image, 3, axis=1)
     assert [third.reshape(-1, 3).max(axis=0).round(9).tolist() for third in thirds] == colors

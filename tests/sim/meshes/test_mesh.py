@@ -1,4 +1,4 @@
-"""Mesh files of every format: what is loaded, scenes of nodes, and faces without area."""
+"""Mesh files of every format: the loaded mesh, scenes of nodes, and faces without area."""
 
 import logging
 import os
@@ -43,7 +43,7 @@ def sphere():
 
 
 def test_teapot_by_name(tmp_path, monkeypatch):
-    """It is always the built-in one."""
+    """The word always gives the built-in teapot."""
     monkeypatch.chdir(tmp_path)
     Path("teapot").write_text("not a mesh")
     loaded = load_mesh("teapot", triangles=992)
@@ -71,7 +71,7 @@ def test_every_format(tmp_path, suffix):
 
 @pytest.mark.parametrize("uri", ["a.bin", "sub/my%20data.bin", None])
 def test_buffer_of_a_gltf_file(tmp_path, uri):
-    """Beside it, under an escaped name, in the URI."""
+    """The buffer is beside the file, under an escaped name, or in the URI."""
     (tmp_path / "sub").mkdir()
     document, buffer = mesh_gltf(uri=uri)
     (tmp_path / (uri or "unused").replace("%20", " ")).write_bytes(buffer)
@@ -128,8 +128,8 @@ def test_trimesh_log_stays_off_the_terminal(tmp_path, monkeypatch, capfd):
 @pytest.mark.parametrize("stored", [True, False])
 @pytest.mark.parametrize("mirror", [1, -1])
 def test_node_transforms(tmp_path, sphere, stored, mirror):
-    # A sphere stretched, turned and moved by two nested nodes is an ellipsoid x = M s + t; its normals are
-    # those of |M^-1 (x - t)| = 1, along M^-T s.
+    # A sphere that two nested nodes stretch, turn and move is an ellipsoid x = M s + t. Its normals are those
+    # of |M^-1 (x - t)| = 1, along M^-T s.
     outer = trimesh.transformations.rotation_matrix(0.7, [1, 2, 3])
     outer[:3, 3] = [10, -20, 30]
     inner = np.diag([mirror * 2.0, 0.5, 3.0, 1.0])
@@ -143,7 +143,7 @@ def test_node_transforms(tmp_path, sphere, stored, mirror):
     assert np.abs(np.linalg.norm(unit, axis=1) - 1).max() < 1e-6
     expected = normalise(unit @ np.linalg.inv(matrix))
     angle = np.degrees(np.arccos(np.clip(np.einsum("vi,vi->v", loaded.mesh.normals, expected), -1, 1)))
-    # float32 for stored ones; a coarse, stretched ellipsoid for computed ones.
+    # float32 for stored normals; a coarse, stretched ellipsoid for computed normals.
     assert angle.max() < (1e-4 if stored else 15)
     assert volume(loaded.mesh) == pytest.approx(3 * sphere.volume, rel=1e-5)
     corners = loaded.mesh.normals[loaded.mesh.faces]
@@ -178,7 +178,7 @@ def test_points_beside_a_mesh(tmp_path):
 
 
 def test_nodes_of_many_levels(tmp_path):
-    """In a moment, and each at its position."""
+    """Nodes of many levels load in a moment, each at its position."""
     nodes = [{"mesh": 0, "translation": [1, 0, 0], "children": [k + 1]} for k in range(999)]
     mesh = load(tmp_path / "a.glb", mesh_gltf(nodes=[*nodes, {"mesh": 0}])).mesh
     assert len(mesh.faces) == 1000
@@ -200,7 +200,7 @@ def test_faces_without_area_that_join_nothing_are_dropped_and_counted(tmp_path):
     vertices = [*TRIANGLE, [2, 0, 0], [1 / 3, 1 / 3, 1 / 3], [2 / 3, 2 / 3, 2 / 3], [1, 1, 1]]
     faces = [[0, 1, 2], [0, 1, 3], [1, 1, 2], [4, 5, 6], [2, 2, 2]]
     loaded = check(load(tmp_path / "a.obj", obj_of(vertices, faces)))
-    # The second lies along a side of the first, and has its normal.
+    # The second face lies along a side of the first, and has its normal.
     assert (len(loaded.mesh.faces), loaded.dropped_faces) == (2, 3)
     assert np.ptp(loaded.mesh.normals, axis=0).max() < 1e-15
 
@@ -213,7 +213,7 @@ def test_a_sliver_is_no_face_without_area(tmp_path):
 
 @pytest.mark.parametrize("scale", [1e-150, 1e-9, 1, 1e9, 1e150])
 def test_small_and_large_models(tmp_path, sphere, scale):
-    # Below an area of about 1e-13 trimesh computes no normal at all.
+    # Below an area of about 1e-13 trimesh computes no normal.
     loaded = check(load(tmp_path / "a.obj", obj_of(sphere.vertices * scale, sphere.faces)))
     assert (loaded.dropped_faces, len(loaded.mesh.faces)) == (0, len(sphere.faces))
     one = normalise(loaded.mesh.vertices)
@@ -237,7 +237,7 @@ def test_vertices_that_are_not_finite(tmp_path, value):
     with np.errstate(over="ignore"):
         put(tmp_path / "a.ply", trimesh.Trimesh(vertices, [[0, 1, 2]], process=False))
     check_refused(tmp_path / "a.ply", "NaN or infinite")
-    # A vertex of no face does not matter.
+    # A vertex without a face does not matter.
     assert len(load(tmp_path / "a.obj", f"v {value} 0 0\n{CORNERS}f 2 3 4\n").mesh.vertices) == 3
 
 

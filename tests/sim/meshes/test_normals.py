@@ -1,4 +1,4 @@
-"""Vertex normals: computed ones against analytic shapes, stored ones kept or mended."""
+"""Vertex normals: computed normals against analytic shapes, stored normals kept or repaired."""
 
 import numpy as np
 import pytest
@@ -36,12 +36,12 @@ def prism(sides):
 )
 def test_crease_angle(tmp_path, crease, vertices):
     # 12 sides meet at 30 degrees: smooth (24 vertices, radial normals) or cut (4 vertices a side). At exactly
-    # 30 the cut needs an angle above, and the slack takes up the rounding of the float32 file.
+    # 30 the cut needs a larger angle, and the slack covers the rounding of the float32 file.
     mesh = check(load(tmp_path / "prism.ply", prism(12), crease_angle=crease)).mesh
     assert len(mesh.vertices) == vertices
     if vertices == 24:
         radial = normalise(mesh.vertices * [1, 0, 1])
-        # float32 stores a coordinate to 6e-8; an edge of 0.5 turns by at most 4 times that.
+        # float32 stores a coordinate to 6e-8. An edge of 0.5 turns by at most 4 times that.
         assert np.abs(mesh.normals - radial).max() < 1e-6
     else:
         assert np.abs(mesh.normals[mesh.faces] - face_normals(mesh)[:, np.newaxis]).max() < 1e-6
@@ -61,8 +61,9 @@ def test_crease_angle_out_of_range(angle):
 
 
 def test_crease_that_ends_in_a_smooth_patch(tmp_path):
-    # A sheet cut half way by a fold: sharp at one end, flat at the other, all faces connected by smooth edges
-    # elsewhere. The corner in the middle of the fold must be cut although its faces are one smooth patch.
+    # A fold cuts a sheet half way: it is sharp at one end and flat at the other. Elsewhere smooth edges
+    # connect all faces. The corner in the middle of the fold must be cut, although its faces are one smooth
+    # patch.
     x, z = np.meshgrid([-1.0, 0.0, 1.0], [0.0, 1.0, 2.0, 3.0])
     y = np.where(x == 0, np.array([[0.0], [0.0], [0.0], [1.0]]), 0.0)
     grid = np.arange(12).reshape(4, 3)
@@ -77,7 +78,7 @@ def test_crease_that_ends_in_a_smooth_patch(tmp_path):
 
 
 def test_angle_weighted(tmp_path):
-    # At a cube's corner the three faces have 90 degrees each, in 3 to 6 triangles: only weights by angle give
+    # At a cube's corner the three faces have 90 degrees each, in 3 to 6 triangles. Only weights by angle give
     # the diagonal.
     mesh = load(tmp_path / "cube.stl", trimesh.creation.box(extents=(2, 2, 2)), crease_angle=180).mesh
     assert len(mesh.vertices) == 8
@@ -91,7 +92,7 @@ def test_faces_back_to_back(tmp_path):
 
 
 def test_stl_cube_stays_sharp(tmp_path):
-    # Merged vertices make trimesh shade a cube like a ball.
+    # With merged vertices trimesh shades a cube like a ball.
     mesh = load(tmp_path / "cube.stl", trimesh.creation.box()).mesh
     assert np.sort(np.abs(mesh.normals), axis=1).tolist() == [[0, 0, 1]] * 24
 
@@ -100,7 +101,7 @@ def test_stl_cube_stays_sharp(tmp_path):
 
 
 def tilted(sphere):
-    """Unit normals of a sphere, all turned by 40 degrees about y: nothing that could be computed."""
+    """Unit normals of a sphere, all turned by 40 degrees about y. They cannot be computed from the shape."""
     return sphere.vertices @ trimesh.transformations.rotation_matrix(np.radians(40), [0, 1, 0])[:3, :3].T
 
 
@@ -112,7 +113,7 @@ def test_stored_normals_survive(tmp_path, sphere, suffix):
     loaded = load(tmp_path / f"s{suffix}", content)
     assert loaded.repaired_normals == 0
     expected = tilted(trimesh.Trimesh(normalise(loaded.mesh.vertices), loaded.mesh.faces, process=False))
-    # float32 in PLY and GLB; OBJ is written with 8 decimals. trimesh's own way to one mesh loses them.
+    # float32 in PLY and GLB; OBJ is written with 8 decimals. trimesh's own way to a single mesh loses them.
     assert np.abs(loaded.mesh.normals - expected).max() < 3e-7
 
 
@@ -131,7 +132,7 @@ def test_bad_stored_normals_are_mended_and_counted(tmp_path, sphere, suffix):
     loaded = check(load_mesh(path))
     assert loaded.repaired_normals == 6
     radial = normalise(loaded.mesh.vertices)
-    # The icosphere is regular to a degree or so: a computed normal is that near to the radius.
+    # The icosphere is regular to about a degree, so a computed normal is that near to the radius.
     assert np.einsum("vi,vi->v", loaded.mesh.normals, radial).min() > np.cos(np.radians(3))
     assert np.abs(loaded.mesh.normals - radial)[3:].max() < 3e-7
 
@@ -151,7 +152,7 @@ def test_obj_whose_normals_cannot_be_used_is_counted(tmp_path):
 
 
 def test_ply_with_texture_coordinates_keeps_its_normals(tmp_path):
-    # The fact: cutting at texture seams reorders the vertices and leaves the normals.
+    # The fact is: a cut at texture seams reorders the vertices and leaves the normals.
     header = ["ply", "format ascii 1.0", "element vertex 4"]
     header += [f"property float {name}" for name in ("x", "y", "z", "nx", "ny", "nz")]
     header += ["element face 2", "property list uchar int vertex_indices"]

@@ -1,4 +1,4 @@
-"""Polygons of OBJ and PLY files cut into triangles, and numbers that are none."""
+"""Polygons of OBJ and PLY files cut into triangles, and faces that are no polygons."""
 
 import struct
 
@@ -9,7 +9,7 @@ from blysk.sim.meshes.polygons import triangulated
 
 from .files import check_refused, load, obj_of
 
-# Corners in order, counter-clockwise; the first corner sees all of none but the square.
+# Corners in order, counter-clockwise. Only in the square does the first corner see all other corners.
 OUTLINES = {
     "square": [(0, 0), (1, 0), (1, 1), (0, 1)],
     "dart": [(4, 0), (0, 4), (1, 1), (0, -4)],
@@ -40,7 +40,7 @@ def spiral(count, seed):
 
 
 def check_cover(outline, corners):
-    """As much area as the polygon, by triangles that are all turned like it: no overlap and no gap."""
+    """Check that the triangles have the polygon's area and its orientation: no overlap and no gap."""
     areas = np.array([shoelace(np.asarray(outline)[triangle]) for triangle in corners])
     assert (areas * np.sign(shoelace(outline)) >= -1e-12).all()
     assert areas.sum() == pytest.approx(shoelace(outline), rel=1e-12)
@@ -62,7 +62,8 @@ def test_triangles_cover_the_polygon(outline, turn):
 
 
 def test_many_polygons_keep_their_order():
-    """Convex and concave ones of one count, each far from the others, together as alone."""
+    """Convex and concave polygons with equal numbers of corners, far from each other, are cut together as
+    alone."""
     outlines = [spiral(7, seed) for seed in range(50)]
     vertices = np.concatenate([placed(outline, seed) for seed, outline in enumerate(outlines)])
     polygons = np.arange(350).reshape(50, 7)
@@ -73,7 +74,7 @@ def test_many_polygons_keep_their_order():
 
 
 def test_polygons_without_area():
-    """They give triangles without area, which are dropped and counted elsewhere."""
+    """Polygons without area give triangles without area. Other code drops and counts these."""
     for points in (np.zeros((5, 3)), np.outer(np.arange(5), [1, 2, 3]), np.full((5, 3), np.nan)):
         corners, _ = triangulated(points.astype(float), np.arange(5)[np.newaxis])
         assert len(corners) == 3
@@ -104,13 +105,16 @@ def drawn_area(loaded):
 def test_concave_polygon_of_obj(tmp_path, outline):
     loaded = load(tmp_path / "a.obj", obj_of(placed(outline, 1), [range(len(outline))]))
     assert drawn_area(loaded) == pytest.approx(shoelace(outline))
-    # All triangles face one way: a fan would turn some over.
+    # All triangles face the same way. A fan would turn some over.
     assert (loaded.mesh.normals @ loaded.mesh.normals[0] > 0.999).all()
 
 
 @pytest.mark.parametrize("order", ["", "<", ">"])
 def test_concave_polygon_beside_a_triangle_of_ply(tmp_path, order):
-    """Lists of different lengths, of which trimesh refuses binary ones and fan-splits those of a text."""
+    """Lists have different lengths.
+
+    trimesh refuses binary files of this kind and splits those in texts as fans.
+    """
     loaded = load(tmp_path / "a.ply", ply(placed(OUTLINES["C"], 2), order))
     extra = abs(shoelace(OUTLINES["C"][:3]))
     assert drawn_area(loaded) == pytest.approx(shoelace(OUTLINES["C"]) + extra)
@@ -151,7 +155,7 @@ def test_bad_obj(tmp_path, text, reason):
 
 
 def test_weight_of_1_and_colours(tmp_path):
-    """Beside positions without: trimesh takes columns by the first line."""
+    """These stand beside positions without a weight. trimesh takes the columns of the first line."""
     text = "v 0 0 0 1.0\nv 1 0 0\nv 1 1 0 1 0 0\nv 0 1 0 1e0\nf 1 2 3 4\n"
     loaded = load(tmp_path / "a.obj", text)
     assert drawn_area(loaded) == pytest.approx(2)

@@ -50,7 +50,7 @@ def test_polygons_and_odd_spelling_in_obj(tmp_path, text):
 
 
 def test_objects_and_materials_weld_to_one(tmp_path):
-    # Two halves of a flat sheet in two materials: no seam in the normals.
+    # Two halves of a flat sheet have two materials, and there is no seam in the normals.
     text = "v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nusemtl a\nf 1 2 3\nusemtl b\nf 1 3 4\n"
     assert len(load(tmp_path / "a.obj", text).mesh.vertices) == 4
 
@@ -90,7 +90,7 @@ def test_relative_indices_count_from_their_face(tmp_path):
 @settings(max_examples=100, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(data=st.data())
 def test_obj_however_it_is_written(tmp_path, data):
-    """Triangles side by side, in any spacing, order and numbering, with lines between that are none."""
+    """Triangles side by side, in any spacing, order and numbering, with other lines between them."""
     space = data.draw(st.sampled_from([" ", "  ", "\t", " \t "]))
     end = data.draw(st.sampled_from(["\n", "\r\n"]))
     tail = st.sampled_from(["", " ", "\t", " # note", "#"])
@@ -139,7 +139,7 @@ def test_binary_stl_that_begins_like_a_text(tmp_path):
 
 @pytest.mark.parametrize("word", ["", "element", "property", "element vertex", "property float"])
 def test_much_space_in_a_ply_header(tmp_path, word):
-    """The time grows with the length, and not with its square: of that this would take minutes."""
+    """The time grows with the length, and not with its square, with which this test would take minutes."""
     for space in ("\n", " ", "\t"):
         text = f"ply\nformat ascii 1.0\n{word}{300_000 * space}x\nend_header\n"
         check_refused(tmp_path / "a.ply", content=text)
@@ -173,7 +173,7 @@ def test_draco_without_its_decoder(tmp_path, uninstalled):
 
 
 def test_corrupt_gltf_does_not_load_its_neighbour(tmp_path):
-    # The fact: trimesh falls back to a file called model.gltf in the same folder.
+    # The fact is: trimesh falls back to a file called model.gltf in the same folder.
     for name, data in trimesh.Scene(trimesh.creation.box()).export(file_type="gltf").items():
         (tmp_path / name).write_bytes(data)
     path = tmp_path / "mine.gltf"
@@ -236,7 +236,7 @@ def test_references_that_are_no_files(tmp_path, name):
 
 @pytest.mark.parametrize("kind", ["outside", "inside", "one material", "gltf"])
 def test_reads_the_file_and_checked_references_only(tmp_path, monkeypatch, kind):
-    # No material file outside the folder, and nothing at all where materials are not asked for.
+    # No material file outside the folder is read, and none at all if materials are not wanted.
     library = "../../secret.mtl" if kind == "outside" else "a.mtl"
     path, other = tmp_path / "a.obj", tmp_path / "a.mtl"
     put(path, f"mtllib {library}\n{CORNERS}vt 0 0\nusemtl a\nf 1/1 2/1 3/1\n")
@@ -288,7 +288,7 @@ def test_empty_and_nonsense(tmp_path, suffix):
     ],
 )
 def test_cut_short(tmp_path, suffix, reason):
-    """At every seventh byte; a text after every line."""
+    """A file is cut at every seventh byte, a text after every line."""
     box, path = trimesh.creation.box(), tmp_path / f"a.{suffix.split('.')[1]}"
     if suffix == "ascii.ply":
         lines = box.export(file_type="ply", encoding="ascii").splitlines(keepends=True)
@@ -305,7 +305,7 @@ def test_cut_short(tmp_path, suffix, reason):
 
 @pytest.mark.parametrize("count", [10**6, 2**31, 2**32 - 1, 10**18, 10**30])
 def test_absurd_counts(tmp_path, count):
-    # None of these may be believed: allocated for, or waited for.
+    # No memory may be allocated for these numbers, and nothing may wait for them.
     ply, stl = (trimesh.creation.box().export(file_type=kind) for kind in ("ply", "stl"))
     for old, new in ((b"element vertex 8", b"element vertex %d"), (b"element face 12", b"element face %d")):
         check_refused(tmp_path / "a.ply", content=ply.replace(old, new % count))
@@ -321,7 +321,7 @@ def test_absurd_counts(tmp_path, count):
 
 @pytest.mark.parametrize("suffix", [".obj", ".ply", ".stl", ".glb", "ascii.ply"])
 def test_damaged_bytes(tmp_path, suffix):
-    """A file with random bytes changed is loaded whole, or refused in one line; nothing else comes out."""
+    """A file with changed random bytes is loaded whole, or refused in one line. Nothing else is printed."""
     options = {"encoding": "ascii"} if suffix == "ascii.ply" else {}
     path = tmp_path / f"a.{suffix.split('.')[1]}"
     data = trimesh.creation.icosphere(subdivisions=1).export(file_type=path.suffix[1:], **options)

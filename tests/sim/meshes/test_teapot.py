@@ -13,7 +13,7 @@ from blysk.sim.meshes.teapot import control_points, teapot
 
 
 def de_casteljau(patch, u, v):
-    """One point of a bicubic patch by repeated halving of lines, one number at a time."""
+    """A point of a bicubic patch by repeated halving of lines, one number at a time."""
 
     def curve(points, t):
         while len(points) > 1:
@@ -68,15 +68,15 @@ def test_points_and_normals_against_de_casteljau():
         for u in (0.25, 0.5, 0.75):
             for v in (0.25, 0.5, 0.75):
                 distance, vertex = tree.query(de_casteljau(patch, u, v))
-                # Coordinates below 4: 40 roundings of 2**-53 * 4 are 2e-14.
+                # Coordinates are below 4: 40 roundings of 2**-53 * 4 are 2e-14.
                 assert distance < 2e-14
-                # A central difference of step 1e-5: 1e-16 / 1e-5 of rounding, 1e-10 of curvature.
+                # A central difference of step 1e-5 has 1e-16 / 1e-5 of rounding and 1e-10 of curvature.
                 assert np.abs(mesh.normals[vertex] - numerical_normal(patch, u, v)).max() < 1e-8
 
 
 def test_published_tessellation():
-    # teapot992.obj is the same 32 patches at n = 4, 5 times as large and centred, written to 6 decimals.
-    # Its table has an error in one rim patch (x < 0, z > 0), which moves 12 vertices by up to 0.038.
+    # teapot992.obj has the same 32 patches at n = 4, 5 times as large and centred, with 6 decimals. Its table
+    # has an error in one rim patch (x < 0, z > 0), which moves 12 vertices by up to 0.038.
     path = Path(__file__).parents[2] / "data" / "teapot992.obj"
     lines = path.read_text(encoding="utf-8").splitlines()
     published = np.array([line.split()[1:] for line in lines if line.startswith("v ")], dtype=float)
@@ -116,7 +116,7 @@ def test_unit_normals_and_no_face_without_area(triangles):
     # Squares, sum, root and division round to at most 3 units of 2**-53 each way.
     assert np.abs(np.linalg.norm(mesh.normals, axis=1) - 1).max() < 8 * 2**-53
     areas = np.linalg.norm(face_cross(mesh), axis=1) / 2
-    # Regular faces shrink as 1 / count; rounding would make a face of zero area 1e-16 or so.
+    # Regular faces shrink as 1 / count. By rounding a face of zero area would have about 1e-16.
     assert areas.min() * len(mesh.faces) > 0.1
     assert np.unique(mesh.faces).size == len(mesh.vertices)
 
@@ -130,8 +130,8 @@ def test_winding_agrees_with_normals():
 
 
 def test_normals_point_outward():
-    # A point a little outside has the pot's own axis behind it: body, lid and bottom have it at x = z = 0,
-    # handle and spout a curve in the plane z = 0, so the sign of z is that of the normal there.
+    # The pot's own axis is behind a point a little outside. For body, lid and bottom the axis is x = z = 0.
+    # For handle and spout it is a curve in the plane z = 0, so there the sign of z is that of the normal.
     mesh = teapot(10_000)
     x, y, z = mesh.vertices.T
     radius = np.hypot(x, z)
@@ -151,8 +151,8 @@ def test_normals_point_outward():
 
 
 def test_flux_against_quadrature():
-    # The flux of (x, y, z) / 3 through all patches, outward: a polynomial of degree 8 in u and in v, for
-    # which Gauss-Legendre with 5 nodes is exact. A tessellation's error falls as 1 / n**2: 1e-4 for n = 79.
+    # The outward flux of (x, y, z) / 3 through all patches is a polynomial of degree 8 in u and in v.
+    # Gauss-Legendre with 5 nodes is exact for it. A tessellation's error falls as 1 / n**2: 1e-4 for n = 79.
     nodes, weights = np.polynomial.legendre.leggauss(5)
     exact = 0.0
     for patch in control_points():
@@ -168,7 +168,7 @@ def test_flux_against_quadrature():
 
 
 def test_smooth_seams_share_their_vertices():
-    # A point that stands twice has two normals: only where the handle's lower end meets the body.
+    # A point that occurs twice has two normals. This is only where the handle's lower end meets the body.
     mesh = teapot(10_000)
     _, index, count = np.unique(mesh.vertices, axis=0, return_inverse=True, return_counts=True)
     twice = count[index.ravel()] > 1
@@ -178,7 +178,7 @@ def test_smooth_seams_share_their_vertices():
 
 
 def test_seams_are_closed():
-    # Every edge has two faces, but for 6 open borders: circles of 4 patch sides at rim and lid, loops of 2
+    # Every edge has two faces, except at 6 open borders: circles of 4 patch sides at rim and lid, loops of 2
     # at both ends of handle and spout.
     mesh = teapot(10_000)
     edges = np.sort(mesh.faces[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2), axis=1)

@@ -1,4 +1,5 @@
-"""Texts are read the same however they were saved: marks, ends of lines, comments, headers of binaries."""
+"""Texts are read the same however they were saved: marks, ends of lines, comments, headers of binary
+files."""
 
 import base64
 import json

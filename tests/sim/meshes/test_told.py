@@ -1,4 +1,4 @@
-"""What changes a picture and is not read is told: OBJ, MTL, PLY and STL; plain data is drawn."""
+"""Contents that change a picture and are not read are told: OBJ, MTL, PLY and STL. Plain data is drawn."""
 
 import struct
 
@@ -87,7 +87,7 @@ def test_mtl_keywords_that_are_not_read(tmp_path, text):
     told = MTL_TOLD[text]
     loaded = load(tmp_path / "a.obj", "mtllib a.mtl\nusemtl a\n" + OBJ)
     assert loaded.ignored == ((f"of materials: {told}",) if told else ())
-    # What no face has, or nobody asked for, changes no picture.
+    # Contents that no face has, or that no option asked for, change no picture.
     assert load(tmp_path / "a.obj", "mtllib a.mtl\n" + OBJ).ignored == ()
     assert load_mesh(put(tmp_path / "a.obj", "mtllib a.mtl\nusemtl a\n" + OBJ), materials=False).ignored == ()
 
@@ -160,7 +160,7 @@ STRIPS = np.array([0, 1, 2, 3, -1, 2, 3, 4, -1, 4, 3, 3, 2])
 @pytest.mark.parametrize("rows", [1, 3])
 @pytest.mark.parametrize("faces", [False, True])
 def test_ply_strips(tmp_path, form, rows, faces):
-    """As Stanford writes them, in one list, and a list for each; beside faces, too."""
+    """Strips as Stanford writes them, in one list, or in a list for each strip; also beside faces."""
     points = [(0, 0, 0), (1, 0, 0), (0, 1, 0), (1, 1, 0), (0, 2, 0.4)]
     lists = [STRIPS.tolist()] if rows == 1 else [[0, 1, 2, 3], [2, 3, 4], [4, 3, 3, 2]]
     head = f"ply\nformat {form} 1.0\nelement vertex 5\n" + "".join(f"property float {x}\n" for x in "xyz")

@@ -39,7 +39,8 @@ def outline_of(seed, repeated=False):
 
 
 def check_sides(triangles, count):
-    """Each side of the polygon in one triangle, each other side in two, in opposite directions."""
+    """Check that each side of the polygon is in one triangle, and each other side in two, in opposite
+    directions."""
     sides = Counter((t[k], t[(k + 1) % 3]) for t in triangles for k in range(3))
     alone = {(a, b) for a, b in sides if (b, a) not in sides}
     assert set(sides.values()) == {1}
@@ -65,14 +66,14 @@ def test_every_side_and_corner_is_kept(kind):
             assert areas.min() > -1e-9
             distinct = len(np.unique(outline, axis=0))
             assert (areas > 1e-9).sum() == distinct - 2
-        # The flux through a surface is that through any other with its border.
+        # The flux through a surface equals that through any other surface with its border.
         first, second, third = np.moveaxis(places[corners], 1, 0)
         flux = np.cross(second - first, third - first).sum(axis=0)
         np.testing.assert_allclose(flux, np.cross(places, np.roll(places, -1, axis=0)).sum(axis=0), atol=1e-9)
 
 
 def prism(outline, heights):
-    """Vertices and faces of a closed solid: two polygons, and a wall of four corners on each side."""
+    """Vertices and faces of a closed solid: two polygons, and a wall with four corners on each side."""
     count = len(outline)
     low, high = np.c_[outline, -1 + heights], np.c_[outline, 1 + heights]
     walls = [[k, (k + 1) % count, count + (k + 1) % count, count + k] for k in range(count)]
@@ -81,7 +82,7 @@ def prism(outline, heights):
 
 
 def check_closed(mesh):
-    """As many sides in one direction as in the other, by position."""
+    """Check that each side, by position, occurs equally often in both directions."""
     _, place = np.unique(mesh.vertices + 0.0, axis=0, return_inverse=True)
     faces = place.ravel()[mesh.faces]
     sides = Counter(zip(faces.ravel().tolist(), np.roll(faces, -1, axis=1).ravel().tolist(), strict=True))
@@ -130,7 +131,8 @@ def covered(rows):
 
 
 def check_covered(loaded, outline, away, back_faces):
-    """No background within the silhouette: of the golden frame, and of the coverage of hardware geometry."""
+    """Check that no background shows within the silhouette, in the golden frame and in the coverage of
+    hardware geometry."""
     camera = Camera(7 * away / np.linalg.norm(away), (0, 0, 0), projection="perspective")
     material = Material(GREY, GREY, GREY, 10)
     scene = Scene(loaded.mesh, camera, *SIZE, material, (Light((0, 0, 1)),), back_faces=back_faces)
@@ -143,7 +145,7 @@ def check_covered(loaded, outline, away, back_faces):
 
 
 def check_shaded(loaded, away):
-    """Hardware geometry negates no normal of a triangle that rounding turned over."""
+    """Check that hardware geometry negates no normal of a triangle that rounding turned over."""
     camera = Camera(7 * away / np.linalg.norm(away), (0, 0, 0), projection="perspective")
     design = preset("linear", "cosquad", 1)
     scene = Scene(loaded.mesh, camera, 160, 120, Material(GREY, GREY, GREY, 10), (Light(away),))
@@ -163,7 +165,7 @@ def test_no_background_shows_through_a_solid(tmp_path, seed):
 
 
 def test_triangles_without_area_of_the_file_close_its_seams(tmp_path):
-    """The two polygons are cut by the file itself, as fans whose triangles lie along a side."""
+    """The file itself cuts the two polygons, as fans whose triangles lie along a side."""
     corners = 2 * np.array([[-0.9, -0.8], [1.0, -0.3], [-0.2, 0.9]])
     along = np.linspace(0, 1, 14)[1:-1, np.newaxis]
     first, second, third = corners

@@ -148,7 +148,10 @@ READERS = {".stl": of_stl, ".obj": of_obj, ".ply": of_ply, ".gltf": of_gltf, ".g
 
 
 def moments(triangles):
-    """Area, and integrals of the coordinates and of their products over it: whatever the order."""
+    """Area, and integrals of the coordinates and of their products over the surface.
+
+    They do not depend on the order.
+    """
     cross = np.cross(triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0])
     area = np.linalg.norm(cross, axis=1) / 2
     total = triangles.sum(axis=1)
@@ -184,7 +187,7 @@ def test_triangles(name):
 
 
 def test_draco():
-    """Positions of 14 bits over each mesh's box of 3 units: the same scene but for that."""
+    """Positions have 14 bits over each mesh's box of 3 units. Except for this, the scene is the same."""
     pytest.importorskip("DracoPy")
     found, expected = read("gltf-transform-draco.glb"), read("three-scene.glb")
     assert len(found) == len(expected)
@@ -193,7 +196,7 @@ def test_draco():
 
 @pytest.mark.parametrize("start", [0, 60, 200])
 def test_damaged_draco_is_refused(tmp_path, start):
-    """trimesh would leave out the part, one of three."""
+    """trimesh would leave out this part, one of three."""
     pytest.importorskip("DracoPy")
     data = bytearray((WORLD / "gltf-transform-draco.glb").read_bytes())
     start += data.index(b"DRACO")
@@ -218,7 +221,7 @@ def test_one_shape_in_two_formats_is_one_picture(first, second, tolerance):
     if "draco" in second:
         pytest.importorskip("DracoPy")
     frames = [render(scene(str(WORLD / name), size=(96, 72), materials="one")) for name in (first, second)]
-    # Edges of the silhouette may go to the next pixel.
+    # Edges of the silhouette may be one pixel away.
     assert (frames[0].mask != frames[1].mask).mean() < 0.005
     both = frames[0].mask & frames[1].mask
     assert np.abs(frames[0].image - frames[1].image)[both].mean() < tolerance
@@ -227,7 +230,7 @@ def test_one_shape_in_two_formats_is_one_picture(first, second, tolerance):
 @pytest.mark.filterwarnings("ignore:.* is drawn without:RuntimeWarning")
 @pytest.mark.parametrize("name", FILES)
 def test_picture(name):
-    """The golden renderer draws each; it fills a good part of the picture, and stays within its box."""
+    """The golden renderer draws each file. It fills a good part of the picture, and stays within its box."""
     if "draco" in name:
         pytest.importorskip("DracoPy")
     made = scene(str(WORLD / name), size=(80, 60))
