@@ -55,7 +55,7 @@ class Attributes:
 
     Without perspective A is the word of `AttributeSpans`.
 
-    *Error.* The relative error of r is at most `RECIPROCAL_ERROR`. The products and their cuts add
+    *Error.* The relative error of r is at most `RECIPROCAL_ERROR`. The products and their dropped bits add
     `COLOR_ERROR` or `COORDINATE_ERROR`. Both sums are within 2^-17 for colours and 2^-18 for coordinates.
     `errors` adds the errors of the words and of the last rounding.
 

@@ -41,7 +41,7 @@ class HalfChord:
     Lengths are in units of `ONE`. The coefficients contain this unit.
 
     The error relative to the angle (beyond 90 degrees: to its supplement) is at most `RELATIVE_ERROR`, and
-    the cut of the result adds 2^-36 turns. docs/theory/bounds.md#half-chord derives it.
+    the dropped bits of the result add 2^-36 turns. docs/theory/bounds.md#half-chord derives it.
 
     Source: docs/theory/interpolation.md#half-chord; [T] 3.3.
     """

@@ -53,8 +53,8 @@ class Quotient:
     place        UQ(i, 12)   cut
     ============ =========== =====================================================================
 
-    A pixel with ``q < 2^-14`` of the largest scale is flagged. Its results are invalid. After the two cuts of
-    `spans_for` q is at least 0.05, and no pixel is flagged.
+    A pixel with ``q < 2^-14`` of the largest scale is flagged. Its results are invalid. In spans that are cut
+    for the method (`QuotientInterpolator.cut`) q is at least 0.05, and no pixel is flagged.
 
     The relative error of r is at most `ROOT_ERROR`, the relative error of s at most `SINE_ERROR`. N·L is off
     by `ROOT_ERROR` and 2^-16. docs/theory/bounds.md#quotient derives them.

@@ -60,13 +60,13 @@ class Recurrence:
     The result has the format `result_format`.
 
     The error of the result is at most `error`. In ``reinsch`` it is at most ``psi^2/2 2^-F``, psi = (m - 1)
-    d, **for any length**, plus 4.8e-7 by the cuts in 4095 pixels. In ``direct`` it is 0.05 after 64 pixels.
-    From 300 pixels on the range of the words gives the only bound, 3. docs/theory/bounds.md#recurrence
-    derives the bounds.
+    d, **for any length**, plus 4.8e-7 by the bits dropped in 4095 pixels. In ``direct`` it is 0.05 after 64
+    pixels. From 300 pixels on the range of the words gives the only bound, 3.
+    docs/theory/bounds.md#recurrence derives the bounds.
 
     With d up to 90 degrees and ``|A| <= 1 - 2^-16`` no word of ``reinsch`` wraps, in spans of any length.
-    This needs 16 or more fraction bits and 20 or more guard bits. With shorter words the cuts add up: with 8
-    and 10 bits, spans of very small steps wrap after about 1300 pixels.
+    This needs 16 or more fraction bits and 20 or more guard bits. With shorter words the errors of dropped
+    bits add up: with 8 and 10 bits, spans of very small steps wrap after about 1300 pixels.
 
     **Interleaved**, for one pixel a cycle. The product in the loop takes several cycles, so four recurrences
     share the loop. Phase j has the pixels j, j + 4, j + 8, ...: ``x(k+4) = 2 cos(4d) x(k) - x(k-4)``. This is

@@ -20,7 +20,8 @@ class DepthTester:
     always drawn. If depths are equal, the first pixel stays.
 
     The step is rounded to nine fraction bits; this error, at most 2^-10, adds up along a span. With this
-    error the depth of a pixel is off by at most ``2^23`` times `GradientSetup.error`, plus 1 for the cut.
+    error the depth of a pixel is off by at most ``2^23`` times `GradientSetup.error`, plus 1 for the dropped
+    fraction.
 
     Source: docs/theory/geometry.md#depth; not in the documents.
     """

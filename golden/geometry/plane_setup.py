@@ -75,8 +75,8 @@ class PlaneSetup:
     ``row_shift = 8 - s + e`` and by ``column_shift``, 8 less the exponent of ``1/W``, which is -11 to 8.
     Triangles of ``W <= 1/256`` are slivers. Their ``1/W`` is 0: they have the attributes of the long edge.
 
-    The relative error of ``1/d`` is `HEIGHT_ERROR`, 2 `Reciprocal.ERROR`. The cut of A adds 2^-25 and the
-    `wide_product` 2^-24: the relative error of ``1/W`` is `WIDTH_ERROR`, 2^-22.7. The setup takes seven
+    The relative error of ``1/d`` is `HEIGHT_ERROR`, 2 `Reciprocal.ERROR`. The dropped bits of A add 2^-25 and
+    the `wide_product` 2^-24: the relative error of ``1/W`` is `WIDTH_ERROR`, 2^-22.7. The setup takes seven
     multiplications.
 
     Parameters

@@ -33,10 +33,10 @@ class SurfaceWords:
     `AttributeSpans`.
 
     The error of a plane is under ``1.1 2^-11`` in every triangle of the grid (`GradientSetup.error`). So no
-    word of a covered pixel reaches 1. The cut of the start and the last rounding add 3/2 steps of 2^-23. The
-    cuts of a step add ``i 2^-e`` steps at pixel i. If one more place did not fit, a step is over
-    ``2^-(e + 1)``, and ``i 2^-e`` is under 4. So a word is off by `ERROR` at most, beside the error of the
-    planes.
+    word of a covered pixel reaches 1. The dropped bits of the start and the last rounding add 3/2 steps of
+    2^-23. The dropped bits of a step add ``i 2^-e`` steps at pixel i. If one more place did not fit, a step
+    is over ``2^-(e + 1)``, and ``i 2^-e`` is under 4. So a word is off by `ERROR` at most, beside the error
+    of the planes.
 
     Source: docs/theory/geometry.md#surface; not in the documents.
     """

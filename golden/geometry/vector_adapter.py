@@ -78,8 +78,8 @@ class VectorAdapter:
 
     Rounding moves a component of the start by half a step of its word. If the longer end is at least
     `SHORTEST`, this is at most `ERROR` times its length. At the right end rounding of the step adds `ERROR`
-    times the distance of the ends, or a sixteenth of a step. Its cut adds up to an eighth. The errors of N/W
-    and of the triangle's gradient are added. All together are under 4 steps.
+    times the distance of the ends, or a sixteenth of a step. The dropped bits of the step add up to an
+    eighth. The errors of N/W and of the triangle's gradient are added. All together are under 4 steps.
 
     Parameters
     ----------

@@ -60,7 +60,7 @@ class AngularInterpolator(EndNormalInterpolator):
 
     @property
     def highlight_excess(self) -> float:
-        """Sum of the errors of setup, cosine and its cut; the curve is the great circle."""
+        """Errors of setup and cosine, and of the cosine's dropped bits. The curve is the great circle."""
         angles = np.linspace(1e-4, self.gate_angle, 1000)
         setup = AngularSetup.error(angles).max()
         return float(setup) + HighlightCosine.ERROR + HighlightCosine.RESULT_FORMAT.step

@@ -247,7 +247,7 @@ class LocalChordInterpolator(Interpolator):
         return 30.0
 
     def operand_error(self, length: int, degrees: float) -> float:
-        """Error of the setup, for slopes up to 1/2 and squares up to 1/8, plus the cut of the results."""
+        """Error of the setup, for slopes up to 1/2 and squares up to 1/8, plus the results' dropped bits."""
         slope, curvature = np.asarray(0.5), np.asarray(0.125)
         errors = (f(slope, curvature) for f in (self.setup.highlight_error, self.setup.diffuse_error))
         return float(max(errors)) + Specular.ARGUMENT_FORMAT.step

@@ -191,9 +191,10 @@ class NormalInterpolator(EndNormalInterpolator):
     def highlight_excess(self) -> float:
         """Bound of the excess of N·H: `normal_error`, or more with half the squared chord.
 
-        With half the squared chord it is twice `normal_error`, because ``|N - H| <= 2``, plus the cut. Let r
-        be the length of a normal on the curve and c its cosine to H. Half the squared chord is ``(1 - r)^2/2
-        + r (1 - c)``, at least ``r (1 - c)``. The lengths of the codes of N_l and H differ from 1.
+        With half the squared chord it is twice `normal_error`, because ``|N - H| <= 2``, plus the error of
+        the dropped bits. Let r be the length of a normal on the curve and c its cosine to H. Half the squared
+        chord is ``(1 - r)^2/2 + r (1 - c)``, at least ``r (1 - c)``. The lengths of the codes of N_l and H
+        differ from 1.
         """
         if not self.uses_chord:
             return self.normal_error

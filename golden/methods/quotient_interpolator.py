@@ -282,7 +282,7 @@ class QuotientErrors:
         length : int array, shape (spans,)
             Pixels.
         mirror : bool
-            Whether the highlight is one of R·V.
+            Whether the highlight is of R·V.
         further : bool
             Whether the bounds are for a further light.
         """
@@ -310,7 +310,7 @@ class QuotientErrors:
         length : int
             Pixels.
         mirror : bool
-            Whether the highlight is one of R·V.
+            Whether the highlight is of R·V.
         """
         shortest = QuotientInterpolator.SHORTEST * 2.0**17 - 3
         component, least, last = (np.array([value]) for value in (2.5, shortest, length - 1.0))
@@ -336,7 +336,7 @@ class QuotientErrors:
         last : float array, shape (spans,)
             Pixels less 1.
         mirror : bool
-            Whether the highlight is one of R·V.
+            Whether the highlight is of R·V.
         first : float array, shape (spans,), optional
             For a further light: ``component`` of the first light, whose words make q.
         """

@@ -239,7 +239,7 @@ class AdaptiveNormaliser:
         Returns
         -------
         Fixed, shape (pixels, components), SQ(2, 32)
-            Values before the last cut, with half a step of the result added.
+            Values before their last bits are dropped, with half a step of the result added.
         """
         reciprocal, shift = (x[span] for x in self.reciprocal(np.maximum(length - 1, 1)))
         phi = Fixed(COMPONENT, ((offset * reciprocal) << 1 >> shift)[:, np.newaxis])

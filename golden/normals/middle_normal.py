@@ -109,7 +109,7 @@ class MiddleNormal:
     @property
     def error(self) -> float:
         """Bound on the error of a component against the exact function of the same two code vectors."""
-        # The cut of the half sum is multiplied by e, which may be too large by the fit's error.
+        # e multiplies the error of the half sum's dropped bits. e may be too large by the fit's error.
         return 2 * (1 + 2.0**-18) * self.model_error + self.ARITHMETIC_ERROR
 
     @cached_property

@@ -52,7 +52,7 @@ class CoplanarPhong(ReflectionModel):
     p (`exponent_ratio`).
 
     Elsewhere R·V is no function of N·H, and this model differs from Phong's. In grazing light the highlight
-    of this model is drawn out, like Blinn's, whereas Phong's stays round.
+    of this model is stretched, as with Blinn's model. With Phong's model it stays round.
 
     Source: docs/theory/models.md#reflection-models; [P].
     """

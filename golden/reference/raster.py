@@ -392,8 +392,8 @@ def _drawn(scene: Scene, pieces: _Pieces) -> tuple[np.ndarray, np.ndarray, int]:
                 dropped += int(which.sum())
             before = buffer[pixel]
             np.maximum.at(buffer, pixel, value)
-            # A pixel must be nearer than the stored depth. At equal depth the lower triangle, drawn before,
-            # stays.
+            # A pixel must be nearer than the stored depth. At equal depth the triangle with the lower index
+            # stays. It was drawn before.
             winner = np.flatnonzero((value > before) & (value == buffer[pixel]))[::-1]
             # If a pixel is assigned several times, the last assignment counts. In reversed order it comes
             # from the first span of the chunk.

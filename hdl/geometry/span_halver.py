@@ -46,8 +46,8 @@ class SpanHalverUnit(wiring.Component):
 
     A span, or a piece, is offered on the cycle after it was taken in. While the output is ready, a span is
     taken in on every cycle. A span that does not fit takes two cycles more each time that it is tried again.
-    So does the rest of a span behind a piece. Both ends of an attribute share one adder. The unit has no
-    multipliers.
+    The rest of a span behind a piece takes two cycles more, too. Both ends of an attribute share one adder.
+    The unit has no multipliers.
 
     Parameters
     ----------

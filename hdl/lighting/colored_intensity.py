@@ -127,7 +127,7 @@ class _Issue(NamedTuple):
     ----------
     busy, first, ends_channel, colored : Signal
         ``busy``: there is a product. ``first`` and ``ends_channel``: it is the first product, or the last, of
-        its channel in the pass. ``colored``: the pass is the second, that of the albedo.
+        its channel in the pass. ``colored``: the pass is the second pass, which has the albedo as a factor.
     channel : Signal
         Channel of the product.
     operands : pair of Value

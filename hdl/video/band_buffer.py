@@ -42,11 +42,11 @@ class BandBufferUnit(wiring.Component):
 
     Toggles cross between the clocks, each through two flip-flops. Each buffer has two toggles: one tells that
     it is filled, the other tells that it is free. A toggle marks the beginning of a slot, and another marks a
-    late band. The numbers of bands and of the slot cross beside the toggles. So does a bit that tells whether
-    a free buffer was shown. Each of these words is written with its toggle or a cycle before. It is read at
-    least two cycles of the reader's clock later. The constraint is that the words' paths take less than one
-    period of the reader's clock. A slot lasts longer than a crossing, because its lines have 800 pixels each
-    by default.
+    late band. The numbers of bands and of the slot cross beside the toggles. A bit that tells whether a free
+    buffer was shown crosses in the same way. Each of these words is written with its toggle or a cycle
+    before. It is read at least two cycles of the reader's clock later. The constraint is that the words'
+    paths take less than one period of the reader's clock. A slot lasts longer than a crossing, because its
+    lines have 800 pixels each by default.
 
     Parameters
     ----------
