@@ -1,4 +1,4 @@
-"""Claims of [T]: speed in software, the same in hardware, shares of shading, and its measure MNSE."""
+"""Claims of [T]: speed in software and in hardware, share of shading in the time, and the measure MNSE."""
 
 from dataclasses import dataclass
 from functools import cache

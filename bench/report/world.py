@@ -116,7 +116,7 @@ def own(method: str, model: str, date: str) -> dict[str, str]:
 
 
 def claims(quick: bool) -> list[Claim]:
-    """Statements of the sources of other cores, and of this project. They are the same if quick."""
+    """Statements of the sources of other cores, and of this project. A quick report has the same."""
     found = []
     for quantity, printed in OTHERS.items():
         found += [Claim(f"{CORES[key]} [{key}]", "", quantity, printed=text) for key, text in printed.items()]

@@ -36,7 +36,7 @@ __all__ = [
 ]
 
 _CHUNK = 1 << 17
-"""Number of samples that are measured at a time. It bounds the memory."""
+"""Number of samples that are measured at a time. This number bounds the memory."""
 
 
 @dataclass(frozen=True)

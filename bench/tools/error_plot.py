@@ -1,4 +1,4 @@
-"""Drawings of the errors of the variants of a unit against its operand."""
+"""Drawings of the errors of a unit's variants, against the operand of the unit."""
 
 import re
 from collections.abc import Sequence

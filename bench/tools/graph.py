@@ -165,7 +165,7 @@ _LIKENESS_DEPTH = 8
 
 
 def likeness(graph: Graph) -> str:
-    """A text of a graph. Graphs that differ only in widths, names of registers and constants share it."""
+    """Text of a graph. Graphs that differ only in widths, register names and constants share this text."""
     labels = {
         number: repr(
             (

@@ -302,7 +302,7 @@ class Netlist:
 
 
 def _parts(word: tuple[int, ...], names: dict[tuple, list[str]]) -> list[tuple[str, int, int]]:
-    """Name, offset and width of a register's fields. A register without fields is its only field."""
+    """Name, offset and width of a register's fields. A register without fields counts as a single field."""
     whole = _short(names[word])
     stems = {f"{name}." for name in names[word]}
     found = {}

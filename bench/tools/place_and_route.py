@@ -102,7 +102,7 @@ class Layout:
 
     @property
     def closed(self) -> int:
-        """Multipliers with registers inside on both sides. nextpnr does not time paths between these."""
+        """Multipliers with registers on both sides. nextpnr does not time paths between these registers."""
         return max(place.closed for place in self.places)
 
     def as_dict(self) -> dict[str, Any]:
@@ -122,7 +122,7 @@ class Layout:
 class Registered(wiring.Component):
     """A component with a register at every port except clock and reset.
 
-    The registers break its handshakes, so it is only for timing, not for simulation.
+    The registers break the handshakes of the component. So this component is for timing, not for simulation.
 
     Parameters
     ----------
@@ -241,7 +241,7 @@ def _refuse_too_large(kinds: Mapping[str, int], family: Family) -> None:
 
 
 def _write_without_ports(path: Path, netlist: Mapping[str, Any]) -> None:
-    """Write a netlist without its ports for placement. It may have more ports than the FPGA has pins."""
+    """Write a netlist without its ports for placement. A design may have more ports than an FPGA has pins."""
     top = {**netlist["modules"]["top"], "ports": {}}
     path.write_text(json.dumps({**netlist, "modules": {**netlist["modules"], "top": top}}), encoding="utf-8")
 
