@@ -1,4 +1,4 @@
-"""A browser, a command that is stopped, and a report of made-up figures: what tests share."""
+"""Shared fixtures: a browser, a command that is stopped, and a report of made-up figures."""
 
 import base64
 import contextlib
@@ -67,7 +67,7 @@ def browser():
 
 @pytest.fixture
 def watching(browser):
-    """Pages without a network, and what goes wrong in them and is asked for, until all are closed."""
+    """Open pages without a network. Afterwards no page may have had an error or a request."""
 
     @contextlib.contextmanager
     def watching():
@@ -109,9 +109,11 @@ def session_of(process):
 
 @pytest.fixture
 def interrupted(tmp_path):
-    """Interrupt a script once a process that it began is called ``sleep``: its status, and what it says.
+    """Interrupt a script when a process that it began is called ``sleep``.
 
-    Neither a process nor a file of it is left.
+    The result has its status and its output.
+
+    Neither a process nor a file of the script may be left.
     """
     if not Path("/proc/self/stat").exists():
         pytest.skip("needs /proc")
@@ -155,7 +157,7 @@ def picture(value):
 
 
 def frame(rng, task, exponent, simulated):
-    """What `frames` would give, of random figures."""
+    """The result that `frames` would give, with random figures."""
     settings = task.settings
     errors = {axis["key"]: float(10 ** rng.uniform(-1.5, 2)) for axis in frames.ERRORS}
     if exponent == 10 and settings.get("model") == "exp":
@@ -210,7 +212,7 @@ def points_section():
 
 @pytest.fixture(scope="session")
 def plain_section():
-    """A section with text, a drawing, a table with grades and a long one."""
+    """A section with text, a drawing, a table with grades and a long table."""
     figure = Figure(figsize=(5, 2.5))
     figure.subplots().plot([0, 1, 2], [0, 1, 4])
     grades = [["", "good", "fair"], ["", "bad", ""]]
@@ -254,12 +256,12 @@ FEW = {
     },
     geometry: {"_QUICK": geometry._QUICK[:1]},
 }
-"""What the sections of `quick_report` measure; their own tests measure the rest."""
+"""The results that the sections of `quick_report` measure. Other tests measure the rest."""
 
 
 @pytest.fixture(scope="session")
 def quick_report(tmp_path_factory):
-    """Folder of ``blysk bench --quick`` with all sections and kinds of measurement, of few designs each."""
+    """Folder of ``blysk bench --quick`` with all sections and kinds of measurement, for few designs each."""
     folder = tmp_path_factory.mktemp("quick") / "report"
     with pytest.MonkeyPatch.context() as patch:
         for section, values in FEW.items():

@@ -1,11 +1,12 @@
-"""What tests read in pages."""
+"""A reader of pages for tests."""
 
 from collections import defaultdict
 from html.parser import HTMLParser
 
 
 class Reader(HTMLParser):
-    """Ids, addresses, the texts of elements with an id, and the cells of each table of a well-formed page."""
+    """Ids, addresses, the texts of elements with an id, and the cells of each table, of a well-formed
+    page."""
 
     VOID = frozenset({"meta", "img", "br", "input", "link", "hr"})
 

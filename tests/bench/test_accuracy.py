@@ -1,4 +1,4 @@
-"""Frames of the exponents asked for, and their errors."""
+"""Frames of the exponents that the caller names, and their errors."""
 
 import math
 import re
@@ -29,7 +29,7 @@ def test_measures_every_exponent():
 @pytest.mark.parametrize("exponent", [10, 1000])
 @pytest.mark.parametrize("ambient", [None, 0.02])
 def test_errors_of_srgb_are_under_an_lsb(ambient, exponent):
-    """Of the bench's grey material, and of the default material in dark ambient light; off the border."""
+    """The bench's grey material, and the default material in dark ambient light, off the border."""
     mesh = teapot(992)
     scene = scene_for(mesh, exponent, 160, 120)
     if ambient is not None:
@@ -56,7 +56,7 @@ def test_errors_of_srgb_are_under_an_lsb(ambient, exponent):
     ids=str,
 )
 def test_the_table_in_readme_is_what_its_command_prints(column, options):
-    """Its errors, by the bit-accurate model of the frame that the command simulates."""
+    """The table has the errors of the bit-accurate model of the frame that the command simulates."""
     text = (Path(__file__).parents[2] / "README.md").read_text(encoding="utf-8")
     command = "`blysk render teapot --transfer linear --exponent 100 --method ... --model ...`"
     assert command in " ".join(text.split())

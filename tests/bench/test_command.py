@@ -77,7 +77,7 @@ print(*names, set(helped), set(refused), heavy & sys.modules.keys(), errors.getv
 
 
 def test_help_and_refused_arguments_load_nothing_heavy(tmp_path):
-    """Of every command: what does its work is imported after the checks."""
+    """For every command the code that does the work is imported after the checks."""
     refused = [
         "bench --only nothing",
         "bench --jobs 0",

@@ -1,4 +1,4 @@
-"""Measurements are made once, kept as soon as they are there, and made again when anything changes."""
+"""Measurements are made once, kept at once, and made again if anything changes."""
 
 import json
 import math
@@ -138,7 +138,7 @@ def test_results_that_are_no_finite_numbers_are_kept():
 
 
 def test_what_is_done_beside_a_failure_is_kept(tmp_path):
-    """All at once: which is looked at first is chance."""
+    """All run at once, so chance decides which is checked first."""
     tasks = [Task(square, {"number": number}) for number in range(20)]
     futures = [Future() for _ in tasks]
     for number, future in enumerate(futures):
@@ -164,7 +164,7 @@ def test_a_cache_without_room_for_results(tmp_path):
 
 
 def test_two_at_once(tmp_path):
-    """Both measure; each finds whole entries only."""
+    """Both measure, and each finds only whole entries."""
     tasks = [Task(square, {"number": number}) for number in range(30)]
     with ThreadPoolExecutor(2) as executor:
         first, second = (executor.submit(results_of, tasks) for _ in range(2))

@@ -9,7 +9,10 @@ from blysk.bench.surfaces import sphere
 
 
 def test_sphere():
-    """Closed, of unit radius, faces anticlockwise from outside, and as large as a sphere but for chords."""
+    """The sphere is closed, has unit radius, and its faces go anticlockwise from outside.
+
+    Its area is that of a sphere, except for chords.
+    """
     mesh = sphere(24)
     np.testing.assert_allclose(np.linalg.norm(mesh.vertices, axis=1), 1)
     np.testing.assert_allclose(mesh.normals, mesh.vertices, atol=1e-15)

@@ -1,4 +1,4 @@
-"""Figures as SVG: small, the same each time, and with all that is in them."""
+"""Figures as SVG: small, the same each time, and complete."""
 
 import re
 
@@ -31,7 +31,7 @@ def test_svg_keeps_what_is_written():
 
 
 def test_svg_is_the_same_drawing_with_classes():
-    """Every element keeps its style, as its own or as that of its class."""
+    """Every element keeps its style, by itself or by its class."""
     text = svg(figure_of([0, 1], [1, 0], color="#123456", linestyle="--"))
     rules = dict(re.findall(r"^\.(\w+)\{([^}]*)\}$", text, flags=re.MULTILINE))
     used = re.findall(r' class="(\w+)"', text)

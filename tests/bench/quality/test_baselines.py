@@ -1,4 +1,4 @@
-"""The baselines: nothing moves by more than 2 % unnoticed, and the check itself can fail."""
+"""The baselines: no figure changes by more than 2 % unnoticed, and the check itself can fail."""
 
 import json
 from contextlib import nullcontext
@@ -26,14 +26,14 @@ BASELINES = read()
 
 
 QUICK = "parts: dot_product"
-"""All of them take minutes."""
+"""All of these take minutes."""
 
 
 @pytest.mark.parametrize(
     "name", [name if name == QUICK else pytest.param(name, marks=pytest.mark.long) for name in ENTRIES]
 )
 def test_nothing_moved(name, monkeypatch):
-    """And no operand of a multiplier has more than 18 bits."""
+    """No figure has changed, and no operand of a multiplier has more than 18 bits."""
 
     def narrow(component):
         cost = cost_of(component)
@@ -90,7 +90,7 @@ def test_parts_are_those_of_the_cost():
 
 @pytest.mark.long
 def test_cycles_are_those_of_the_pixels():
-    """The simulation by hand, to the last pixel; at least a clock a pixel."""
+    """The simulation runs to the last pixel, and takes at least a cycle a pixel."""
     design = preset("linear", "cosquad")
     cycles = cycles_of(design)
     scenes = resources._scenes()
@@ -146,7 +146,7 @@ def test_missing_and_further_entries_are_differences():
 
 @pytest.fixture
 def small(monkeypatch, tmp_path):
-    """Two entries, measured at once, in a file of their own; the figures can be changed."""
+    """Two entries, measured at once, in a separate file. Tests can change the figures."""
     figures = {"one": {"cells": 1000}, "two": {"cells": 2000, "multipliers": 3}}
     path = tmp_path / "baselines.json"
     monkeypatch.setattr(baselines, "FILE", path)

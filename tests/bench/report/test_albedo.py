@@ -33,7 +33,7 @@ def settings_of(name, filter, transfer="srgb"):
 
 @pytest.mark.parametrize("name", SCENES)
 def test_measure(name):
-    """Errors are within their bounds; only a filter with steps has borders on the floor."""
+    """Errors are within their bounds. On the floor only the filter with steps has borders."""
     for filter in (None,) if name == COLORED else ("bilinear", "nearest"):
         found = measure(**settings_of(name, filter))
         assert 0.4 < found["error"] <= min(1, found["bound"])
@@ -48,7 +48,7 @@ def test_measure(name):
 @pytest.mark.parametrize("projection", ["perspective", "orthographic"])
 @pytest.mark.parametrize(("name", "filter"), [(STEEPEST, "bilinear"), (STEEPEST, "nearest"), (COLORED, None)])
 def test_scenes(name, filter, projection):
-    """Texels have the contrast, and the counted design is that of the frame."""
+    """The texels have the contrast, and the counted design is that of the frame."""
     scene = scene_of(name, filter, projection, 0.25, SIZE)
     chosen = {"name": name, "filter": filter, "projection": projection}
     (frame, *_) = [of for of in tasks(False) if chosen.items() <= of.settings.items()]
@@ -100,7 +100,7 @@ def test_section():
 
 
 def test_quick_section():
-    """Two frames of a single design, and no drawing."""
+    """Two frames of a single design, without a drawing."""
     chosen = tasks(True)
     assert len(chosen) == 3
     (table,) = section(chosen, [result(0.5, 1.2), result(0.6, 1.3), 31]).parts

@@ -1,4 +1,4 @@
-"""Claims of the documents: each is measured, its verdict is held; the table that is made of them."""
+"""Claims of the documents: each is measured, its verdict is checked; the table of claims."""
 
 import json
 import math
@@ -17,14 +17,14 @@ NOT_AS_PRINTED = {
 
 
 def verdicts(claims):
-    """Verdicts by quantity, of claims that have a printed value."""
+    """Verdicts by quantity, for claims that have a printed value."""
     results = json.loads(json.dumps(measured(claims)))
     found = [(claim.quantity, claim.verdict(result)) for claim, result in zip(claims, results, strict=True)]
     return {quantity: verdict for quantity, verdict in found if verdict is not None}
 
 
 def test_errata_do_not_come_out():
-    """But the zone, which is chosen so that it does."""
+    """The zone is an exception, because it is chosen so that its figure comes out."""
     found = verdicts(errata.CLAIMS)
     assert {quantity for quantity, verdict in found.items() if verdict} == {
         "largest relative error of f2 in the zone"
@@ -40,7 +40,10 @@ def test_figures_of_the_cosine_quadratic():
 
 
 def test_counts_and_exponents_of_phong_and_blinn():
-    """Fewer operations where H is the frame's; about 4 along the plane of L and V, across at L = V only."""
+    """There are fewer operations if H is the frame's.
+
+    The ratio is about 4 along the plane of L and V, and across it only for L = V.
+    """
     claims = [claim for claim in phong_blinn.claims(quick=True) if not claim.timed]
     found = verdicts(claims)
     assert len(found) == 1 + 2 + 16
@@ -56,7 +59,7 @@ def test_counts_and_exponents_of_phong_and_blinn():
 
 @pytest.mark.long
 def test_speeds_in_hardware():
-    """A cycle a normal either way; and a step of MNSE counts by its place."""
+    """Both ways give a normal a cycle. A step counts in MNSE by its place."""
     claims = [claim for claim in thesis.claims(quick=True) if not claim.timed]
     found = verdicts(claims)
     assert len(found) == 5 + 1
@@ -65,7 +68,7 @@ def test_speeds_in_hardware():
 
 @pytest.mark.parametrize("document", [thesis, phong_blinn])
 def test_times_have_a_verdict(document):
-    """Which one depends on the machine."""
+    """The verdict depends on the machine."""
     of_kind = {(c.function, c.key): c for c in document.claims(quick=True) if c.timed}
     claims = [replace(claim, settings={**claim.settings, "repeats": 1}) for claim in of_kind.values()]
     for claim, result in zip(claims, measured(claims), strict=True):
@@ -96,7 +99,10 @@ def both():
 
 
 def test_the_table_of_claims():
-    """Columns that have an entry, a measurement for claims that share it, a verdict on both values."""
+    """Columns have an entry.
+
+    Claims that share a measurement have one measurement, and a verdict on both values.
+    """
     claims = [
         Claim("[X] 1", "it is half", "half, %", half, {"of": 0.5}, "half", printed="25"),
         Claim("[X] 1", "it is half", "whole", half, {"of": 0.5}, "of"),

@@ -19,7 +19,7 @@ def fq2(gamma, n):
 
 
 def test_errors():
-    """At one exponent on a grid of angles, in plain Python; the largest of all exponents is no less."""
+    """At one exponent, on a grid of angles, in plain Python. The largest of all exponents is not smaller."""
     found = errors("cosquad")
     n, absolute, relative = next(entry for entry in found["by_exponent"] if entry[0] >= 100)
     grid = [(f2(g, n), math.cos(g) ** n) for g in (k * 1e-4 for k in range(15_000))]
@@ -30,7 +30,7 @@ def test_errors():
 
 
 def test_slopes():
-    """0.5 % and 0.14 %; fQ meets Blinn's model where that is 0.64."""
+    """The slopes are within 0.5 % and 0.14 %. fQ meets Blinn's model where that is 0.64."""
     found = slopes()
     assert f"{found['line']:.2%} {found['refitted']:.2%}" == "0.50% 0.14%"
     exact, line = (REFLECTION_MODELS[name].slope for name in ("cosquad_q", "cosquad_lin"))

@@ -35,7 +35,7 @@ def test_use_of_resources():
 
 @pytest.mark.long
 def test_resources():
-    """Each light has multipliers of its own."""
+    """Each light has its own multipliers."""
     assert resources(1)["multipliers"] == 16
     assert resources(2)["multipliers"] > 16
 

@@ -1,5 +1,5 @@
 # amaranth: UnusedElaboratable=no
-"""The design space: designs, their measurements, and lists held against brute force."""
+"""The design space: designs, their measurements, and lists compared with brute force."""
 
 import gc
 import shlex
@@ -83,7 +83,7 @@ def test_impossible_candidates_are_refused(values):
 
 
 def test_quotient_is_swept_with_its_lobes():
-    """Its operand is its own, and it has no choice of words or degrees."""
+    """quotient has its own operand, and no choice of words or degrees."""
     found, impossible = Sweep(methods=("quotient", "renormalise")).candidates()
     quotients = [(one.model, one.style) for one in found if one.method == "quotient"]
     assert quotients == [(model, style) for model in ("blinn", "phong") for style in STYLES]
@@ -92,7 +92,7 @@ def test_quotient_is_swept_with_its_lobes():
 
 
 def test_sweep_has_every_design_once_and_counts_the_impossible():
-    """Against a count by hand: chord-local and angular find no normals; the middle normal has no degree 1."""
+    """A count by hand: chord-local and angular find no normals, and the middle normal has no degree 1."""
     sweep = Sweep(
         methods=("linear", "angular", "chord-local", "quadratic"),
         models=("cosquad", "exp"),
@@ -133,7 +133,7 @@ def test_every_method_is_in_the_default_sweep():
     ],
 )
 def test_command_of_a_design_makes_it(candidate, is_plain, monkeypatch, capsys):
-    """Run as it stands, but for the Verilog; the unit that it would emit is the candidate's."""
+    """The command runs as printed, except for the Verilog. The unit that it would emit is the candidate's."""
     made = []
     monkeypatch.setattr("blysk.hdl.emit.verilog.emit", lambda unit, name, **_: made.append(unit) or "module")
     monkeypatch.setattr("blysk.sim.api.verilog.emit", lambda unit, name, **_: made.append(unit) or "module")
@@ -206,7 +206,7 @@ def test_costs_are_those_of_the_netlist():
 
 
 def records(count=60, seed=7, candidates=None):
-    """Designs with figures out of a few values, so that some are equal."""
+    """Designs whose figures come from a few values, so that some are equal."""
     rng = np.random.default_rng(seed)
     errors = rng.choice([0.5, 0.6, 0.75, 1.0, 1.25, 3.0], (count, 3))
     costs = rng.integers(1, 12, (count, 4)).tolist()
@@ -273,14 +273,14 @@ def test_designs_of_two_styles_share_the_errors_and_not_the_costs():
     assert [first.candidate, second.candidate] == candidates
     assert first.errors == second.errors == frame["errors"]
     assert (first.costs, second.costs) == (parts, {**parts, "cells": 7})
-    # Three spans of 1, one of 2, two of 10 pixels: 25 pixels.
+    # Three spans of 1 pixel, one of 2, two of 10 pixels: 25 pixels.
     assert first.cycles_per_pixel == pytest.approx((3 * 4 + 4 + 2 * 10) / 25)
     assert second.cycles_per_pixel == pytest.approx((3 * 7 + 7 + 2 * 30) / 25)
 
 
 @pytest.mark.long
 def test_stated_cycles_are_a_bound_of_those_of_frames():
-    """Of the baselines, which are simulated; but for bisection, which states none."""
+    """For the simulated baselines, except bisection, which states no cycles."""
     measured = baselines.read()
     for method in METHODS:
         model = "blinn" if METHODS[method].needs_table else "cosquad"

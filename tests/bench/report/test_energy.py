@@ -1,5 +1,5 @@
 # amaranth: UnusedElaboratable=no
-"""Toggled register bits by block: every register in one of them, and what the section makes of the counts."""
+"""Toggled register bits by block: each register is in one block; the section made from the counts."""
 
 from types import SimpleNamespace
 
@@ -40,7 +40,10 @@ def test_every_register_of_the_default_is_in_a_block():
     [*((METHOD, model) for model in MODELS), *((name, MODELS[0]) for name in METHODS if name != METHOD)],
 )
 def test_every_register_is_in_a_block(method, model):
-    """Of the real pipeline, with a gate and without; the gate's are those that it has more."""
+    """A real pipeline with a gate and without.
+
+    The gate's registers are those that the first has in addition.
+    """
     found = {}
     for gate in (False, True):
         unit = ToggleCounter(ShadingPipelineUnit(preset(method, model, gate=gate)))
@@ -75,7 +78,7 @@ def test_inner_submodules_count():
 
 @pytest.mark.long
 def test_counts_of_a_small_frame():
-    """The pixels are the model's, and every block has something to do."""
+    """Pixels equal the model's, and every block has work."""
     for design in ((METHOD, "cosquad", True), (*DESIGN, False)):
         [found] = measure(*design, [50], [20, 15, 64], "pysim")
         assert found["same"]
@@ -92,7 +95,7 @@ def test_the_gate_spares_the_specular_unit():
         assert without["pixels"] == gated["pixels"]
         assert by_block(without["toggles"])["highlight gate"] == 0
     specular = [by_block(of["toggles"])["specular"] for of in (*off, *on)]
-    # Small highlights leave more spans without one.
+    # With small highlights more spans have no highlight.
     assert specular[3] / specular[1] < specular[2] / specular[0] <= 1
 
 

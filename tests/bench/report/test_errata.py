@@ -1,4 +1,4 @@
-"""Evidence of the errata against the published figures, closed forms and hand calculations."""
+"""Evidence of the errata against the published figures, closed forms and calculations by hand."""
 
 import math
 
@@ -56,7 +56,7 @@ def test_published_figures(found, name, published, right):
 
 
 def test_mended_forms(found):
-    """Reinsch's form under 6e-5, and 3e-7 for 24 bits; sqrt(1-x) poly(x) 0.041 % relative."""
+    """Reinsch's form is under 6e-5, and under 3e-7 for 24 bits; sqrt(1-x) poly(x) is 0.041 % off."""
     assert found["recurrence-64-10-16"][1] < 6e-5
     assert found["recurrence-256-60-16"][1] < 6e-5
     assert found["recurrence-4095-60-24"][1] < 3e-7
@@ -64,7 +64,7 @@ def test_mended_forms(found):
 
 
 def test_order_of_the_columns(found):
-    """The other way round the row gives 1.57 x^2 - 0.972 x - 0.144, which is far off at x = 0."""
+    """In the other order the row gives 1.57 x^2 - 0.972 x - 0.144, which is far off at x = 0."""
     assert found["order"][0] == pytest.approx(math.pi / 2 + 0.144, abs=1e-6)
     assert found["order"][1] == pytest.approx(0.0012, abs=5e-5)
 
@@ -77,14 +77,14 @@ CLOSED_FORMS = {
     "second_lobe": (near(16), 0),
     # Ambient 0.02, diffuse 0.323316, specular 0.002058.
     "worked_example": (0.3445, near(0.02 + 0.8 * 0.7 / math.sqrt(3) + 0.5 * 3**-5)),
-    # Two of 64 values are away from the mean.
+    # Two of 64 values differ from the mean.
     "flat_picture": (2 / 64, 1),
-    # 0.2 + 0.2 x + 0.7 y: with 0.7 x in its place both other corners are 0.7 off.
+    # 0.2 + 0.2 x + 0.7 y. With 0.7 x in place of 0.7 y both other corners are 0.7 off.
     "wrong_variable": (near(0.7), near(0)),
-    # Right factors keep all energy; the published ones are off by their ratio to those.
+    # Right factors keep all energy. The published factors are off by their ratio to the right factors.
     "energy-phong-10": (near(math.pi / 10), near(1)),
     "energy-blinn-10": (near(math.pi * (2**-5 + 10) / (10 * (2**5 + 10))), near(1)),
-    # (L x N) x N is (L·N) N - L, so that what is published is 2 (L·N) N - 3 L.
+    # (L x N) x N is (L·N) N - L, so the published formula is 2 (L·N) N - 3 L.
     "mirror": (near(math.sqrt(9 - 8 / 3)), near(1)),
 }
 
@@ -95,7 +95,7 @@ def test_closed_forms(found, name):
 
 
 def test_shortcut(found):
-    """``1 - cos(psi/m)`` tends to ``psi^2/(2 m^2)``: the shortcut's is ``(1 - cos psi)/m^2``."""
+    """``1 - cos(psi/m)`` tends to ``psi^2/(2 m^2)``; the shortcut's value is ``(1 - cos psi)/m^2``."""
     for degrees, shown in ((10, "0.3%"), (60, "8.8%")):
         psi = math.radians(degrees)
         value, one = found[f"shortcut-{degrees}"]
@@ -115,23 +115,25 @@ def test_inverted_test(found):
 
 
 def test_listing_of_the_normal_vector(found):
-    """6 pixels make 5 steps, and 8 in the listing: without N_l the last is N_r - 5/8 N_l."""
+    """6 pixels make 5 steps, and 8 in the listing. Without N_l the last normal is N_r - 5/8 N_l."""
     last = np.array([math.sin(TEN), math.cos(TEN) - 5 / 8])
     last /= math.hypot(*last)
     miss = math.dist(last, (math.sin(TEN), math.cos(TEN)))
     assert found["extrapolated_end"] == (pytest.approx(miss), pytest.approx(0, abs=1e-12))
-    # dN times 0 at the first pixel stays 0: the last normal is the first.
+    # At the first pixel dN times 0 becomes 0, so the last normal is the first.
     assert found["scaled_in_place"] == (near(2 * math.sin(TEN / 2)), near(0))
 
 
 def test_zone(found):
-    """f2 is farthest from Blinn at the zone's bound b, and all but at its limit, ``(1 + ln b / 2)^2``."""
+    """f2 is farthest from Blinn's power at the zone's bound b, and nearly at its limit,
+    ``(1 + ln b / 2)^2``."""
     assert f"{found['zone_error'][1]:.3%}" == "7.924%"
     assert found["zone_error"][1] == pytest.approx(1 - (1 + math.log(ZONE) / 2) ** 2 / ZONE, abs=3e-4)
 
 
 def test_published_digits_are_those_of_chebyshev_nodes():
-    """[T] 2.1 and 2.2: coefficients rounded from those nodes, and bounds of the unrounded ones."""
+    """[T] 2.1 and 2.2: coefficients rounded from Chebyshev's nodes, and bounds of the unrounded
+    coefficients."""
     root, factor = (lambda z: 1 / np.sqrt(2 + z)), (lambda r: 1 / np.sqrt(2 * (1 + r)))
     for function, low, high, published, digits, shown in (
         (root, math.sqrt(2), 2, ROOT_PUBLISHED[1], 2, "0.12%"),
@@ -146,7 +148,7 @@ def test_published_digits_are_those_of_chebyshev_nodes():
 
 
 def test_quadratics_of_the_middle_normal():
-    """The printed 0.002 and 0.36 % are within reach of a quadratic, and are those of Chebyshev's nodes."""
+    """A quadratic can reach the printed 0.002 and 0.36 %. They are those of Chebyshev's nodes."""
     quadratics = factor_quadratics()
     assert {name: f"{relative:.3%}" for name, (_, relative) in quadratics.items()} == {
         "nodes": "0.359%",
@@ -154,7 +156,8 @@ def test_quadratics_of_the_middle_normal():
         "within": "0.344%",
     }
     assert quadratics["within"][0] < 0.002001
-    # The exchange algorithm: relative errors e, -e, e, -e at four places, at their extremes in the end.
+    # The exchange algorithm has relative errors e, -e, e, -e at four places, which are its extremes in the
+    # end.
     x = np.linspace(0, 1, 100_001)
     places = np.array([0, 0.25, 0.75, 1])
     for _ in range(10):

@@ -1,5 +1,6 @@
 # amaranth: UnusedElaboratable=no
-"""The design space: the list against brute force over the same records, resuming, the commands of designs."""
+"""The design space: the list against brute force over the same records, resumed sweeps, the commands of
+designs."""
 
 import json
 import re
@@ -36,7 +37,7 @@ def run(*arguments):
 
 @pytest.mark.long
 def test_sweep_of_four_designs_and_again(tmp_path, monkeypatch):
-    """The listed ones against brute force over all; the second run measures nothing."""
+    """The list equals brute force over all designs. The second run measures nothing."""
     path = tmp_path / "designs.json"
     options = ("--methods", "linear,renormalise", "--models", "cosquad", "--degrees", "2")
     options += ("--operands", "one_minus_cosine", "--fraction-bits", "46", "--json", path)
@@ -137,7 +138,7 @@ def test_bad_options_are_one_line(arguments, text):
 
 
 def made_up(monkeypatch, out_of_range=False, error=0.5):
-    """Results without measuring."""
+    """Results without measurements."""
 
     def results(todo, *_):
         frame = {
@@ -174,7 +175,7 @@ def test_what_is_given_is_told(monkeypatch):
 def test_impossible_ones_are_told(monkeypatch):
     made_up(monkeypatch)
     output = run("--methods", "chord-local,quadratic", "--models", "exp", "--styles", "compact").output
-    # chord-local without a dot product: 2 words; quadratic without degree 1: 2 operands.
+    # chord-local has no dot product: 2 words. quadratic has no degree 1: 2 operands.
     assert output.startswith(
         "impossible  4 combinations: 2 of chord-local: finds no normals, so it has one operand; "
         "2 of quadratic: has no polynomial of degree 1\n"

@@ -1,4 +1,4 @@
-"""The drawing of the front: which axis it has, and designs that it leaves out."""
+"""The drawing of the front: its axis, and the designs that it leaves out."""
 
 import re
 
@@ -49,7 +49,7 @@ def test_cycles_where_most_are_not_placed():
     drawing = conclusion([found()[0], *few]).drawing
     assert drawing.title == "Error against cycles a pixel"
     assert "1 of 4 designs have committed clock rates" in drawing.note
-    # Nor where the best would be left out.
+    # The axis is not used either if the best design would be left out.
     best = found()[0] | {"ns": None, "luts": None, "fmax_mhz": None}
     drawing = conclusion([best, *found(angular=100)[1:]]).drawing
     assert drawing.title == "Error against cycles a pixel"
@@ -58,7 +58,7 @@ def test_cycles_where_most_are_not_placed():
 
 @pytest.mark.parametrize(("mhz", "is_on"), [(250, True), (100, False)])
 def test_front_in_nanoseconds(mhz, is_on):
-    """A design of as small an error, more cycles and a faster clock is on the front: its name is bold."""
+    """A design with an equal error, more cycles and a faster clock is on the front, and its name is bold."""
     faster = summary("quadratic, blinn", 0.6, 1.3, mhz)
     drawing = conclusion([faster, summary("quotient, blinn", 0.6, 1.0, 150), *found()[1:2]]).drawing
     (style, *_) = re.findall(r'<text class="(\w+)"[^>]*>quadratic, blinn</text>', drawing.svg)
@@ -70,7 +70,8 @@ def test_front_in_nanoseconds(mhz, is_on):
     ("luts", "others"), [(4929, "Of 2 other designs none"), (3000, "angular, blinn"), (None, "")]
 )
 def test_as_fast_as_another_and_as_exact(luts, others):
-    """Of two with as many multipliers that with fewer look-up tables is on the front, if both are known."""
+    """Of two designs with equal multipliers the one with fewer look-up tables is on the front, if both
+    numbers are known."""
     other = summary("angular, blinn", 0.58, 1.005, 150) | {"luts": luts}
     own, linear, *_ = found()
     sentence = conclusion([other, own | {"luts": 3169}, linear]).sentence
@@ -81,7 +82,7 @@ def test_as_fast_as_another_and_as_exact(luts, others):
 
 
 def test_phong_is_told_and_on_no_front():
-    """Its errors are against another picture: no design of Blinn's model is compared with it."""
+    """Its errors are against another picture, so no design of Blinn's model is compared with it."""
     phong = summary("quotient, phong", 0.51, 0.9, 150) | {"multipliers": 1}
     made = conclusion([phong, *found()[:2]])
     assert made.sentence.startswith("**`quotient, blinn`**")

@@ -1,4 +1,4 @@
-"""The section on triangles: designs compared, and what becomes of stiff and extreme cases."""
+"""The section on triangles: designs compared, and results of stiff and extreme cases."""
 
 from dataclasses import replace
 
@@ -29,7 +29,7 @@ def cases():
 @pytest.mark.long
 @pytest.mark.parametrize("method", METHODS)
 def test_cases(cases, method):
-    """Coverage is exact; only slivers are off, and only opposite normals come to 0."""
+    """Coverage is exact. Only slivers are off, and only opposite normals add up to 0."""
     for case in cases[method]:
         assert (case["coverage"], case["other"]) == (0, 0)
         assert case["pixels"] > 0
@@ -42,7 +42,7 @@ def test_cases(cases, method):
 
 
 def test_differences_are_found():
-    """A colour, a pixel that is missing, and one of another triangle."""
+    """A colour, a missing pixel, and a pixel of another triangle are found."""
     drawn = next(scene for name, scene in cases_of(True) if "cross" in name)
     renderer = Renderer(preset("renormalise", "blinn", x_bits=12, y_bits=12))
     frame = triangle_frame(drawn, renderer)
@@ -58,7 +58,7 @@ def test_differences_are_found():
 
 @pytest.mark.parametrize("method", METHODS[:2])
 def test_random_coarse_meshes(method):
-    """Ten convex bodies of 8 to 39 corners, whose normals stray by some 30 degrees, along the true line."""
+    """Ten convex bodies of 8 to 39 corners, whose normals differ by about 30 degrees, along the true line."""
     rng = np.random.default_rng(10)
     for count, exponent in zip(rng.integers(8, 40, 10), [1, 20, 100, 400, 1000] * 2, strict=True):
         points = normalise(rng.normal(size=(count, 3))) * rng.uniform(0.7, 1, (count, 1))
@@ -98,7 +98,7 @@ def _result(multipliers, *cycles):
 
 
 def test_section(cases, monkeypatch):
-    """Which design takes less time follows from cycles and clock rates."""
+    """Cycles and clock rates tell which design takes less time."""
     store = [
         {"design": f"render {method}, blinn, 1 light, compact", "device": DEVICE, "fmax_mhz": rates}
         for method, rates in (("quotient", [90, 100, 120]), ("renormalise", [80]), ("quadratic", [100]))

@@ -1,5 +1,5 @@
 # amaranth: UnusedElaboratable=no
-"""What sample scenes do not need: the scenes, the figures, and the section made of them."""
+"""Parts that sample scenes do not need: the scenes, the figures, and the section."""
 
 from pathlib import Path
 
@@ -36,7 +36,7 @@ WHY = {
 
 @pytest.fixture
 def costs(monkeypatch):
-    """Costs without a netlist: a cell less with each reduction."""
+    """Costs without a netlist: each reduction has a cell less."""
 
     def counted(specialisation):
         full, *steps = (
@@ -50,7 +50,7 @@ def costs(monkeypatch):
 
 @pytest.mark.parametrize("name", SCENES)
 def test_scenes(name, costs):
-    """Each shows what it is there for, and its frame is the full pipeline's."""
+    """Each scene shows its purpose, and its frame equals the full pipeline's."""
     found = measure(name, SMALL)
     assert any(WHY[name] in reason for reason in found["reasons"])
     assert found["different_pixels"] == 0
@@ -77,7 +77,7 @@ def test_a_frame_that_differs_is_told(monkeypatch, costs):
 
 @pytest.mark.long
 def test_a_matt_scene_saves_a_quarter():
-    """By its netlists, and by simulation of both; of multipliers it saves half."""
+    """By its netlists, and by simulation of both. Half of the multipliers are saved."""
     found = measure("matt teapot, k_s = 0", SMALL)
     shares = {"cells": 0.7, "multipliers": 0.5, "register_bits": 0.76, "memory_bits": 0.6}
     for resource, share in shares.items():
@@ -88,7 +88,7 @@ def test_a_matt_scene_saves_a_quarter():
 
 
 def test_both_are_simulated(monkeypatch):
-    """By two simulators, the specialised one with the scene that it is for."""
+    """Two simulators draw; the specialised one has the scene for which it was made."""
     asked = []
 
     class Simulator:

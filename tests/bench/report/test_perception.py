@@ -1,4 +1,5 @@
-"""Perceived differences: published colour pairs, equal pictures, and what an eye sees or does not."""
+"""Perceived differences: published colour pairs, equal pictures, and changes that an eye sees or does not
+see."""
 
 import sys
 
@@ -8,7 +9,7 @@ import pytest
 from blysk.bench.report.perception import Perceived, identical_to_the_eye, perceived
 from blysk.sim.errors import InputError
 
-# Sharma, Wu, Dalal 2005, table 1, pairs of colours that sRGB has: L, a, b, L, a, b, difference.
+# Sharma, Wu, Dalal 2005, table 1, pairs of colours within sRGB: L, a, b, L, a, b, difference.
 PAIRS = [
     (50, 0, 0, 50, -1, 2, 2.3669),
     (50, 2.5, 0, 50, 0, -2.5, 4.3065),
@@ -36,7 +37,8 @@ def srgb(lightness, a, b):
     x, y, z = (
         t**3 if t > 6 / 29 else 3 * (6 / 29) ** 2 * (t - 4 / 29) for t in (y + a / 500, y, y - b / 200)
     )
-    # Columns: XYZ of the primaries at xy = (0.64, 0.33), (0.30, 0.60), (0.15, 0.06), in sums that give white.
+    # Columns: XYZ of the primaries at xy = (0.64, 0.33), (0.30, 0.60), (0.15, 0.06), scaled so that their sum
+    # is white.
     primaries = np.array([[0.64, 0.30, 0.15], [0.33, 0.60, 0.06], [0.03, 0.10, 0.79]])
     white = np.array([0.95047, 1, 1.08883])
     to_linear = np.linalg.inv(primaries * np.linalg.solve(primaries, white))
@@ -56,7 +58,7 @@ def everywhere(picture):
 def test_published_colour_differences(pair):
     first, second = (plain(srgb(*color)) for color in (pair[:3], pair[3:6]))
     found = perceived(first, second, everywhere(first))
-    # The library's matrix has six decimals, the primaries' own is exact.
+    # The library's matrix has six decimals. The matrix from the primaries is exact.
     assert found.ciede2000_max == pytest.approx(pair[6], rel=2e-4, abs=1e-3)
     assert found.ciede2000_p99 == pytest.approx(found.ciede2000_max, abs=1e-9)
 
@@ -71,14 +73,14 @@ def test_equal_pictures_do_not_differ():
 def test_black_is_not_white():
     black, white = plain((0, 0, 0)), plain((255, 255, 255))
     found = perceived(black, white, everywhere(black))
-    # Black and white are 100 apart in CIELAB, by definition; FLIP's largest value is 1.
+    # Black and white are 100 apart in CIELAB, by definition. FLIP's largest value is 1.
     assert found.ciede2000_max == pytest.approx(100, abs=1e-3)
     assert 0.9 < found.flip_p99 <= found.flip_max <= 1
     assert not identical_to_the_eye(255, found)
 
 
 def ball(exponent=40):
-    """A shaded ball, in LSB: its diffuse part, its highlight, and where it is."""
+    """A shaded ball, in LSB: its diffuse part, its highlight, and the mask of its pixels."""
     y, x = np.mgrid[-1:1:96j, -1:1:96j]
     mask = x * x + y * y < 0.95
     z = np.sqrt(np.maximum(1 - x * x - y * y, 0))
@@ -97,7 +99,7 @@ def test_noise_of_one_step_is_not_seen():
 
 
 def test_a_slight_change_of_all_is_not_seen():
-    """More than a step: over the first limit, and let through by FLIP and CIEDE2000."""
+    """A change of more than a step is over the first limit, and FLIP and CIEDE2000 let it through."""
     diffuse, highlight, mask = ball()
     exact = diffuse + highlight
     found = perceived(exact + 1.5 * mask, exact, mask[..., 0])
@@ -121,7 +123,7 @@ def test_only_the_mask_counts():
     assert perceived(other, diffuse, mask) == Perceived(0, 0, 0, 0)
     mask[0, 0] = True
     found = perceived(other, diffuse, mask)
-    # One pixel in 401: in the largest alone.
+    # One pixel in 401 counts only in the largest value.
     assert found.ciede2000_max > 90
     assert found.ciede2000_p99 == 0
 

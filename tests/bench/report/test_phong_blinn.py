@@ -1,4 +1,4 @@
-"""Ways of Phong and Blinn against each other, counts by hand, half-widths against formulas."""
+"""Ways of Phong and Blinn compared, counts by hand, half-widths against formulas."""
 
 import base64
 import io
@@ -26,14 +26,17 @@ from blysk.golden.reference.reflection import REFLECTION_MODELS
 
 @pytest.mark.parametrize("local", [False, True])
 def test_ways(local):
-    """All against `lighting`, which has tests of its own; both forms of Phong agree to rounding."""
+    """All are compared with `lighting`, which has tests of its own.
+
+    Both forms of Phong agree up to rounding.
+    """
     normal, light, viewer = operands = vectors(local)
     assert normal.shape == (3, PIXELS)
     assert light.shape == viewer.shape == (3, PIXELS if local else 1)
     found = {name: way(*operands) for name, way in WAYS.items()}
     vector, scalar, blinn = found.values()
     np.testing.assert_allclose(vector, scalar, atol=1e-12)
-    # The ways have no test of N·L > 0 before the highlight.
+    # The ways do not test N·L > 0 before the highlight.
     lit = np.flatnonzero((normal * light).sum(axis=0) > 1e-6)[:40]
     material = Material((0.1,) * 3, (0.4,) * 3, (0.5,) * 3, 50)
     for pixel in lit:
@@ -51,7 +54,7 @@ def test_ways(local):
 
 
 def test_exponents():
-    """Phong sees twice the angle."""
+    """Phong's angle is twice Blinn's."""
     assert exponent_at(0) == 4
     for degrees in (1, 20, 44):
         c = math.cos(math.radians(degrees))
@@ -59,18 +62,19 @@ def test_exponents():
 
 
 def test_operations():
-    """Dot products 3 and 2, diffuse and ambient light 2 and 2 with the weights, a power, two gates."""
+    """Dot products have 3 and 2 operations, diffuse and ambient light with the weights 2 and 2, then a power
+    and two gates."""
     vector, scalar, blinn = WAYS
     rest = {"functions": 1, "comparisons": 2}
     own = operations(vector, True)
     # N·L, R·V, twice a cosine, three times a normal, two weights; R = ... - L.
     assert own == {"multiplications": 12, "additions": 9, **rest, "all": 24, "fewer": 0}
     assert operations(vector, False) == own
-    # N·L, N·V, 2 (N·L)(N·V), weights; L·V besides where it is not the frame's.
+    # N·L, N·V, 2 (N·L)(N·V), weights; also L·V if it is not the frame's.
     own, of_frame = (operations(scalar, local) for local in (True, False))
     assert own == {"multiplications": 13, "additions": 9, **rest, "all": 25, "fewer": 1 - 25 / 24}
     assert of_frame["multiplications"] == pytest.approx(10, abs=0.001)
-    # N·L, N·H, weights; H besides: sum, length, three divisions.
+    # N·L, N·H, weights; also H: sum, length, three divisions.
     own, of_frame = (operations(blinn, local) for local in (True, False))
     dear = {"divisions": 3, "roots": 1}
     assert own == {"multiplications": 11, "additions": 11, **dear, **rest, "all": 29, "fewer": 1 - 29 / 24}
@@ -87,7 +91,7 @@ def test_times():
     frame = frame_times(200, 64, 48, 1)
     assert frame["frame"] == pytest.approx(1 - frame["blinn"] / frame["phong"])
     assert 0 < frame["geometry"] < 1
-    # Geometry costs the same with either model.
+    # Geometry costs the same with both models.
     assert frame["frame"] == pytest.approx(
         frame["shading"] * (1 - frame["geometry"] * frame["blinn"] / frame["phong"])
     )
@@ -101,7 +105,7 @@ def test_half_angles_are_those_of_the_formulas():
             assert half_angle((1, 0), degrees, n) == pytest.approx(math.asin(sine), abs=1e-9)
             across = math.asin(sine / math.cos(math.radians(degrees)))
             assert half_angle((0, 1), degrees, n) == pytest.approx(across, abs=1e-9)
-    # R·V is over half everywhere across.
+    # Across the plane R·V is over one half everywhere.
     assert math.isnan(half_angle((0, 1), 85, 10))
 
 

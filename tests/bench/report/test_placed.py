@@ -1,4 +1,4 @@
-"""The store of place and route: names, merging, what the report takes from it."""
+"""The store of place and route: names, merging, and the data that the report takes from it."""
 
 import json
 import re
@@ -16,7 +16,7 @@ GUIDE = Path(__file__).parents[3] / "docs/guide/fpga.md"
 
 
 def test_table_of_the_guide_is_the_store():
-    """Every row of a pipeline, as placed: parts, and a clock rate a seed."""
+    """Every row of a pipeline has the figures of the store: parts, and a clock rate for each seed."""
     store = {entry["design"]: entry for entry in read_store() if entry["device"] == DEVICE}
     rows = re.findall(
         r"^\| `([\w-]+)`, `(\w+)`(, 1 - N·H)? \| ([\d,]+) \| ([\d,]+) \| (\d+) \| (\d+) \| ([\d, ]+\d)",

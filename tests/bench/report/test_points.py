@@ -1,4 +1,5 @@
-"""Error against run time: what a point holds, the fronts, the pictures, and commands that make it again."""
+"""Error against run time: the data of a point, the fronts, the pictures, and commands that make them
+again."""
 
 import base64
 import contextlib
@@ -45,7 +46,7 @@ FIGURES = [field.name for field in fields(ErrorFigures)]
 PLACE = {"source": "teapot", "triangles": 400, "digest": "of a test", "width": 64, "height": 48}
 
 SIMULATED = ("chord-local", "cosquad")
-"""The design that is the quickest to build."""
+"""The design that is built most quickly."""
 
 
 def task(function, timed=False, exponents=(10, 100), **settings):
@@ -60,7 +61,7 @@ def design(method, model="cosquad", simulated=False):
 
 @pytest.fixture(scope="module")
 def measured():
-    """Tasks of a few designs and a software shading, and their results."""
+    """Tasks of a few designs and of a software shading, and their results."""
     chosen = [
         *design(*SIMULATED, simulated=True),
         *design("linear"),
@@ -105,7 +106,7 @@ def test_quick_tasks():
     chosen = tasks(quick=True)
     own = [s for s in of_frames(chosen) if "operand" not in s]
     assert [(s["method"], s["model"]) for s in own][: len(DESIGNS)] == DESIGNS
-    # Each method in its best form too, with its own model and with the exact table.
+    # Each method is also there in its best form, with its own model and with the exact table.
     best = [(s["method"], s["model"]) for s in of_frames(chosen) if s not in own]
     assert best == [(method, model) for model in ("cosquad", "blinn") for method in BEST]
     exact = {s["method"] for s in of_frames(chosen) if s["model"] == "blinn"}
@@ -152,7 +153,7 @@ def test_further_meshes(tmp_path):
     mesh.write_text("v 0 0 0\nv 2 0 0\nv 0 1 0\nf 1 2 3\n")
     frames_module._mesh.cache_clear()
     digests = {s["view"]["digest"] for s in of_frames(tasks(True, [str(mesh), str(mesh)]))}
-    # The teapot's and another: the file has changed.
+    # These are the teapot's and another mesh's, because the file has changed.
     assert len(digests) == 2
     assert first not in digests
     with pytest.raises(InputError, match=r"missing\.obj"):
@@ -198,7 +199,7 @@ def test_model_has_the_simulated_frame(measured):
 
 @pytest.mark.long
 def test_model_error_is_the_models_own(found):
-    """The largest difference over all angles, times k_s, is all but met somewhere; Blinn's own is none."""
+    """The largest difference over all angles, times k_s, almost occurs somewhere. Blinn's own is 0."""
     cosine = np.linspace(0, 1, 100_001)
     for exponent in (10, 100):
         blinn = cosine**exponent
@@ -216,7 +217,7 @@ def test_model_error_is_the_models_own(found):
 
 
 def test_phong_is_held_against_phong():
-    """Blinn's highlight of the same exponent is another picture, not the exact one."""
+    """Blinn's highlight of the same exponent is another picture, not the exact picture."""
     for exponent, of in zip((1, 100), frames("quotient", "phong", PLACE, [1, 100], False), strict=True):
         errors = of["errors"]
         assert errors["model_max_lsb"] == 0
@@ -266,7 +267,7 @@ def brute(errors, times):
 
 @pytest.mark.parametrize("seed", range(20))
 def test_front(seed):
-    """Against its definition, with ties, equal points and points without figures."""
+    """The front is compared with its definition, with ties, equal points and points without figures."""
     rng = np.random.default_rng(seed)
     errors, times = (rng.integers(0, 12, 40).astype(float).tolist() for _ in range(2))
     errors[3] = times[7] = None
@@ -294,7 +295,7 @@ def test_fronts(measured):
                 name for name in front if by_id[name] in scene
             }
 
-    # More is better.
+    # Here a larger number is better.
     def psnr_and_time(point):
         return point["errors"]["total_psnr_db"], -point["times"]["golden_ns_per_pixel"]
 
@@ -306,7 +307,10 @@ def test_fronts(measured):
 
 @pytest.mark.long
 def test_clock_rate(measured, monkeypatch):
-    """That of the section on place and route; without it and a committed one there are no nanoseconds."""
+    """The clock rate is that of the section on place and route.
+
+    Without it and without a committed rate there are no nanoseconds.
+    """
     chosen, results = measured
     monkeypatch.setattr(points, "placed", lambda device: {})
     task = place_and_route.task(*SIMULATED)

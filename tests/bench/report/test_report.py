@@ -61,7 +61,7 @@ def test_page_has_everything(points_section, plain_section):
     text = page([points_section, plain_section], ABOUT)
     reader = Reader(text)
     assert len(reader.ids) == len(set(reader.ids))
-    # Everything is in it but the files beside it.
+    # The page contains everything except the files beside it.
     outside = {address for address in reader.addresses if not address.startswith(("data:", "#"))}
     assert outside == {"report.json", "points.csv", "front.csv", "fronts.csv", "graded.csv", "long.csv"}
     assert all(address[1:] in reader.ids for address in reader.addresses if address.startswith("#"))
@@ -176,7 +176,7 @@ def test_a_folder_that_may_not_be_written_is_refused(tmp_path, monkeypatch):
 
 
 class Fake:
-    """A section's module: the errors of a small table, some times."""
+    """A section's module: the errors of a small table, and some times."""
 
     def __init__(self, section, count=2):
         self._section, self._count = section, count
@@ -199,7 +199,7 @@ def replace_sections(monkeypatch, modules):
 
 @pytest.fixture
 def run(monkeypatch, plain_section):
-    """Run the command with a section or two of little work."""
+    """Run the command with one or two sections of little work."""
     other = Section("other", "Another", [], [Table("other", "Other", ["a"], [(1,)])])
     replace_sections(monkeypatch, {"plain": Fake(plain_section), "other": Fake(other, 1)})
     return lambda *arguments: CliRunner().invoke(command, [str(argument) for argument in arguments])
@@ -315,7 +315,7 @@ def test_interrupt_says_what_is_kept(run, tmp_path, monkeypatch):
 
 @pytest.mark.long
 def test_interrupt_leaves_nothing_behind(interrupted):
-    """A worker in the midst of a program of its own."""
+    """A worker is interrupted in the midst of a program of its own."""
     status, text = interrupted(
         "import subprocess, sys, blysk.bench.report.sections as r\n"
         "def sleep(seconds): subprocess.run(['sleep', str(seconds)])\n"
@@ -339,7 +339,7 @@ def test_sections_have_tasks(name):
         for task in tasks:
             assert json.loads(json.dumps(task.settings)) == task.settings
             assert getattr(sys.modules[task.function.__module__], task.function.__name__) is task.function
-        # No measurement twice.
+        # No value is measured twice.
         keys = {(task.name, json.dumps(task.settings, sort_keys=True)) for task in tasks}
         assert len(keys) == len(tasks)
 

@@ -30,7 +30,7 @@ def figures(report):
 
 @pytest.fixture
 def open_page(watching, report):
-    """Open the page; afterwards there was no error, and nothing was asked for but the page."""
+    """Open the page. Afterwards there may be no error, and no request but for the page."""
     pages = []
     with watching() as (new_page, errors, requests):
 
@@ -60,7 +60,7 @@ def drawn(figures, error, time, exponent=100):
 
 
 def dots(page):
-    """Places of the drawn points in the window, by id."""
+    """Positions of the drawn points in the window, by id."""
     script = """dots => Object.fromEntries(dots.map(dot => {
         const box = dot.querySelector('.ring').getBoundingClientRect();
         return [dot.dataset.point, [box.x + box.width / 2, box.y + box.height / 2]];
@@ -77,7 +77,7 @@ def test_a_point_opens_its_figures(open_page, figures):
     points = drawn(figures, "total_max_lsb", page.locator("#time-axis").input_value())
     places = dots(page)
     assert set(places) == set(points)
-    # One that stands apart.
+    # A point that stands apart.
     names = list(places)
     where = np.array([places[name] for name in names])
     apart = np.hypot(*(where[:, np.newaxis] - where).T) + 1e9 * np.eye(len(names))
@@ -123,7 +123,7 @@ def test_axes_and_front(open_page, figures):
         page.locator("#exponent").select_option(str(exponent))
         points, places = drawn(figures, error, time, exponent), dots(page)
         assert set(places) == set(points)
-        # Down and left is better, whichever way the figures go.
+        # Down and left is better, whatever the direction of the figures.
         axes = {axis["key"]: axis for axis in figures["errors"] + figures["times"]}
         ids = list(points)
         for kind, key, place in (("times", time, 0), ("errors", error, 1)):
@@ -138,7 +138,7 @@ def test_axes_and_front(open_page, figures):
         assert axes[time]["title"].lower() in page.locator("#meaning").inner_text().lower()
         count = page.locator("#count").inner_text()
         assert count.startswith(f"{len(points)} of 13 designs are drawn.")
-        # Where an error is 0, a logarithmic axis has a place for it.
+        # If an error is 0, a logarithmic axis has a place for it.
         zero = any(point["errors"][error] == 0 for point in points.values())
         assert page.locator("#plot text", has_text=re.compile("^0$")).count() == zero
 
@@ -250,7 +250,7 @@ def test_page_fits_its_window(open_page, width, scheme):
     assert overflow() <= 0
     inside = page.locator("#panel").evaluate("panel => panel.scrollWidth <= panel.clientWidth")
     assert inside
-    # Ink on paper: far enough apart to read.
+    # Text and background differ enough to read.
     script = "name => getComputedStyle(document.documentElement).getPropertyValue(name)"
     dark = {name: brightness(page.evaluate(script, name)) for name in ("--paper", "--ink", "--soft")}
     assert abs(dark["--paper"] - dark["--ink"]) > 0.7
@@ -276,7 +276,7 @@ def test_print(open_page):
         assert page.locator(hidden).first.is_hidden()
     for whole in ("#part-long .scroll", "#part-points .scroll"):
         assert page.locator(whole).evaluate("box => box.scrollHeight <= box.clientHeight + 1")
-    # Headings come again on the next page, which buttons do not.
+    # Headings appear again on the next page, and buttons do not.
     display = "button => getComputedStyle(button).display"
     assert page.locator("#part-long th button").first.evaluate(display) == "contents"
     color = "() => getComputedStyle(document.body).backgroundColor"
@@ -291,7 +291,7 @@ def test_answers_first_and_the_rest_folded(open_page, points_section):
     assert answer.locator("img").evaluate("image => image.naturalWidth") > 0
     assert page.locator("#plot").is_hidden()
     assert page.locator("#section-plain h2").is_visible()
-    # A link opens what it leads to.
+    # A link opens its target.
     answer.locator(".more a").click()
     page.locator("#plot .dot").first.wait_for()
     assert page.locator("#section-points .fold").get_attribute("open") is not None

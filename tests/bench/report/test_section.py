@@ -1,4 +1,4 @@
-"""Tables of the report hold what they say they do."""
+"""Tables of the report have the columns and cells that they state."""
 
 import pytest
 

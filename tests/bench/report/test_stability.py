@@ -1,5 +1,5 @@
 # amaranth: UnusedElaboratable=no
-"""Stiff and extreme cases: every method keeps in each what its documentation promises."""
+"""Stiff and extreme cases: in each, every method keeps the promises of its documentation."""
 
 import dataclasses
 import json
@@ -50,7 +50,7 @@ def cases(group: int) -> list[Case]:
 @pytest.mark.parametrize("method", NAMES)
 @pytest.mark.parametrize("group", GROUPS)
 def test_keeps_what_is_promised(group, method):
-    """Nothing silently wrong: not of spans that are cut, nor in the safe range of spans as they come."""
+    """No error is silent: neither in spans that are cut, nor in the safe range of spans that are not cut."""
     for case in cases(group):
         found = measure_case(case, method)
         assert found["given"]["safe_grade"] != "bad", case.name
@@ -62,13 +62,13 @@ def test_keeps_what_is_promised(group, method):
         prepared = found["prepared"]
         assert prepared["grade"] in ("good", "fair"), case.name
         assert prepared["flagged"] == 0, case.name
-        # The local chord method states less than 1 LSB for every exponent; the quotient is exact.
+        # The local chord method states less than 1 LSB for every exponent. The quotient is exact.
         if method in ("chord-local", "quotient"):
             assert prepared["error"] <= GOOD, case.name
 
 
 def test_what_is_cut_before_is_not_served():
-    """Of renormalise the lengths count, and no angle: a line to a normal of 0 has none at one end."""
+    """For renormalise lengths count, and no angle. A line to a normal of 0 has no length at one end."""
     [case] = [case for case in cases(6) if case.name == "one normal 0"]
     found = measure_case(case, "renormalise")
     assert (found["inside"], found["cut"]) == (0, found["spans"])
@@ -76,7 +76,7 @@ def test_what_is_cut_before_is_not_served():
 
 
 def test_quotient_is_given_pairs_as_two():
-    """The step of a span of two pixels may not fit; longer spans and single pixels stay."""
+    """The step of a span of two pixels may not fit. Longer spans and single pixels are unchanged."""
     [case] = [case for case in cases(1) if case.name == "exponent 100"]
     raster = case.raster
     split = split_pairs(raster)
@@ -93,7 +93,7 @@ def test_quotient_is_given_pairs_as_two():
 
 @pytest.mark.parametrize("places", [slice(None), slice(0, 1)])
 def test_an_error_that_nothing_tells_of_is_bad(places, monkeypatch):
-    """One step more than the worst of a frame may be, in one pixel or in all."""
+    """The error is a step more than the worst of a frame may be, in one pixel or in all."""
     [case] = [case for case in cases(1) if case.name == "exponent 10"]
     compute = ShadingPipeline.compute
     right = measure_case(case, "renormalise")
@@ -113,7 +113,8 @@ def test_an_error_that_nothing_tells_of_is_bad(places, monkeypatch):
 
 
 def test_error_is_that_of_the_pictures():
-    """Against the golden renderer's picture of the spans, where no pixel is at the terminator."""
+    """The error is compared with the golden renderer's picture of the spans, without pixels at the
+    terminator."""
     [case] = [case for case in cases(1) if case.name == "exponent 100"]
     raster, design = case.raster, preset("quadratic", "cosquad")
     spans = Spans(
@@ -126,7 +127,10 @@ def test_error_is_that_of_the_pictures():
 
 
 def test_wide_spans_are_told():
-    """Of spans over the widest, some flagged and some not: silently wrong, unless it is small."""
+    """Of spans over the widest, some are flagged and some are not.
+
+    An error that is not flagged is silent, unless it is small.
+    """
     by_angle = {case.name: measure_case(case, "linear")["given"] for case in cases(2)}
     out_of_range = by_angle["90 degrees"]
     assert out_of_range["grade"] == "bad"
@@ -147,13 +151,13 @@ def test_every_case_is_there():
     ):
         assert set(texts) <= set(names)
     for group in GROUPS:
-        # The same again, and every pixel once in the picture that they are held against.
+        # The same spans again, and every pixel is once in the picture with which they are compared.
         for case, again in zip(cases(group), cases_of(group), strict=True):
             np.testing.assert_array_equal(case.raster.normal_right, again.raster.normal_right)
             shown = case.raster.pixel[case.raster.visible]
             assert case.group == group
             assert 0 < len(np.unique(shown)) == len(shown)
-    # Along the shared edge no pixel is drawn twice, and none is left out.
+    # Along the shared edge no pixel is drawn twice, and none is missing.
     [shared] = [case for case in cases(9) if "share an edge" in case.name]
     pixels = np.zeros(64 * 64, dtype=int)
     np.add.at(pixels, shared.raster.pixel, 1)
@@ -171,7 +175,7 @@ def test_arcs():
     left, right = arcs(rng, centre, degrees, at, off)
     np.testing.assert_allclose(np.linalg.norm([left, right], axis=2), 1)
     np.testing.assert_allclose(np.degrees(np.arccos((left * right).sum(axis=1))), degrees, atol=1e-5)
-    # The cosine to the centre is largest at the share, on the circle through both ends.
+    # On the circle through both ends the cosine to the centre is largest at the share.
     expected = np.cos(np.radians(off)) * np.cos(np.radians(at * degrees))
     np.testing.assert_allclose(left @ centre, expected, atol=1e-12)
     expected = np.cos(np.radians(off)) * np.cos(np.radians((1 - at) * degrees))
@@ -194,11 +198,11 @@ def test_worst_grade(grades, worst):
     ],
 )
 def test_ranges(method):
-    """Where the docstrings say that spans are flagged, and every range is good or fair to its end."""
+    """Spans are flagged where the docstrings say so, and every range is good or fair to its end."""
     found = measure_ranges(method)
     interpolator = METHODS[method]
     if interpolator.CURVE == "linear":
-        # A component of N_r - N_l over 1.
+        # A component of N_r - N_l is over 1.
         assert found["none_flagged"] >= 60
         assert found["all_flagged"] > interpolator.MAX_ANGLE
     elif method != "chord-local":
@@ -218,7 +222,7 @@ def test_ranges(method):
 
 @pytest.mark.long
 def test_section():
-    """Of a method's own measurements, through JSON as from the cache."""
+    """Made from measurements of the method, which pass through JSON as from the cache."""
     chosen = [task for task in tasks(quick=True) if task.settings["method"] == "quotient"]
     assert [task.function for task in chosen] == [measure, measure_ranges]
     results = [json.loads(json.dumps(task.run())) for task in chosen]
@@ -233,7 +237,7 @@ def test_section():
         if row["group"] != 5:
             assert row["quotient"] <= GOOD
             assert grades[-1] == "good"
-    # Colours follow the error, marks tell what is stated and what is silent.
+    # Colours follow the error. Marks tell which errors are stated and which are silent.
     cases_of_method = tables["stability-cases"]
     column = list(cases_of_method.columns).index("error cut, LSB")
     for row, grades, marks in zip(
@@ -247,7 +251,7 @@ def test_section():
     assert len(tables["stability-cases"].rows) == sum(len(cases(group)) for group in GROUPS)
     [row] = tables["safe-ranges"].records()
     assert row["method"] == "quotient"
-    # It halves spans from 90 degrees on; the search stops within 0.05 degrees.
+    # It halves spans from 90 degrees on. The search stops within 0.05 degrees.
     assert 89.95 <= row["widest span at n = 1, degrees"] <= 90
     errors = dict(zip(SWEEP, (of["given"]["error"] for of in results[1]["sweep"]), strict=True))
     up_to = row["angle up to which the error is at most 1 LSB, degrees"]

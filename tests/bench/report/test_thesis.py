@@ -65,7 +65,7 @@ def test_ways_by_angles(way):
 
 
 def test_middle_by_the_polynomial():
-    """As long as the published polynomial makes it, in the right direction."""
+    """The middle has the length of the published polynomial, and the right direction."""
     (found,) = results("middle by h(r)", 1)
     length = np.polynomial.polynomial.polyval(COSINE, FACTOR_PUBLISHED) * np.sqrt(2 + 2 * COSINE)
     np.testing.assert_allclose(found, curve("slerp", [0.5])[0] * length, atol=1e-14)
@@ -73,7 +73,7 @@ def test_middle_by_the_polynomial():
 
 @pytest.mark.parametrize("way", ["bisection, a factor each", "bisection, a factor a level"])
 def test_bisection_by_the_polynomial(way):
-    """The first middle has the polynomial's length, by z; the others point along the circle, nearly."""
+    """The first middle has the polynomial's length, by z. The others nearly point along the circle."""
     found = results(way, 16)
     z = 2 * COSINE
     length = np.polynomial.polynomial.polyval(z, ROOT_PUBLISHED[2]) * np.sqrt(2 + z)
@@ -105,7 +105,7 @@ def test_counted():
 
 
 def test_operations():
-    """By hand: what a middle normal takes, and what a long span's pixel takes without its setup."""
+    """Counts by hand: the operations of a middle normal, and of a long span's pixel without its setup."""
     assert counted("middle, normalised, one division", 1) == {
         "multiplications": 6,
         "additions": 5,
@@ -130,7 +130,10 @@ def test_software():
 
 
 def test_price_of_a_root():
-    """With roots and divisions at that price the counts give the printed ratio; no price mends a dear way."""
+    """With this price of roots and divisions the counts give the printed ratio.
+
+    If a way has more of them, no price does.
+    """
     own, other = {"additions": 6.0, "divisions": 0.5}, {"multiplications": 7.0, "roots": 1.0, "divisions": 3}
     cost = price(3.6, own, other)
     assert (7 + 4 * cost) / (6 + 0.5 * cost) == pytest.approx(3.6)
@@ -139,7 +142,7 @@ def test_price_of_a_root():
 
 
 def test_fastest_runs_in_turn(monkeypatch):
-    """The least processor time of each, whatever the clock says."""
+    """The least processor time of each way counts, whatever the clock says."""
     order, cpu = [], iter([3.0, 20.0, 2.0, 30.0, 4.0, 10.0])
 
     def timed(action, repeats):
@@ -158,7 +161,8 @@ def test_prices():
 
 @pytest.mark.long
 def test_hardware():
-    """The renormaliser gives a normal a cycle with 8 multipliers, forward differences do with none."""
+    """The renormaliser gives a normal a cycle with 8 multipliers, and forward differences without
+    multipliers."""
     found = hardware("forward differences", "renormaliser")
     assert found["interval"] == 1
     assert found["multipliers"] is None
@@ -183,7 +187,7 @@ def test_shading_share():
 
 
 def test_square_errors():
-    """By the definitions, on the same reference."""
+    """By the definitions, for the same reference."""
     scene = scene_for(teapot(200), 50, 96, 72)
     frame = render(scene)
     reference = frame.image[frame.mask].ravel() * 255
@@ -193,7 +197,7 @@ def test_square_errors():
         assert found["step"] == pytest.approx([distance.max() / distance.min(), 1], rel=1e-6)
         assert 0.01 < found["nearest"] <= 1
         assert found["p999_lsb"] <= found["max_lsb"]
-        # Errors of that many LSB at most, over the spread of the reference.
+        # Errors of at most this many LSB, divided by the spread of the reference.
         assert 0 < found["nmse"] <= found["max_lsb"] ** 2 / distance.mean()
         assert found["defined"] <= 1
     assert linear["nmse"] > renormalised["nmse"]

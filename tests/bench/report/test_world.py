@@ -1,4 +1,5 @@
-"""The core beside others: every row has a reference, and the figures of this core are those of the store."""
+"""The core beside other cores: every row has a reference, and the figures of this core are those of the
+store."""
 
 from pathlib import Path
 
@@ -27,7 +28,7 @@ def test_own_figures_are_those_of_the_store():
 
 
 def test_cores_stand_beside_each_other():
-    """The rows of a quantity follow each other, ours last; nothing has a verdict."""
+    """The rows of a quantity follow each other, with ours last. No row has a verdict."""
     tasks = {str(claim.settings): claim.task for claim in claims(quick=True) if claim.task}
     (table,) = section(list(tasks.values()), [task.run() for task in tasks.values()]).parts
     assert table.columns == ["source", "quantity", "printed", "measured"]

@@ -1,4 +1,4 @@
-"""The cycle model: its recurrence pair by pair against a loop, and its frames against simulation."""
+"""The cycle model: its recurrence against a loop, and its frames against simulation."""
 
 import numpy as np
 import pytest

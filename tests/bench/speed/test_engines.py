@@ -1,5 +1,5 @@
 # amaranth: UnusedElaboratable=no
-"""The comparison of the engines: it measures, and it notices when they differ."""
+"""The comparison of the engines: it measures, and it notices if they differ."""
 
 import dataclasses
 
@@ -16,7 +16,8 @@ from blysk.sim.engines.engine import Ports
 
 
 class Same:
-    """Stands for Verilator's model: it gives what the compiled engine gave last, or a clock later."""
+    """A stub of Verilator's model: it gives the last output of the compiled engine, or gives it a cycle
+    later."""
 
     def __init__(self, unit, late):
         self.ports, self.late = Ports(unit), late
@@ -27,7 +28,7 @@ class Same:
 
 @pytest.fixture
 def few(monkeypatch):
-    """A pipeline that is soon compiled; runs are kept for `Same`."""
+    """A pipeline that is compiled quickly. Runs are kept for `Same`."""
     unit, simulate = ShadingPipelineUnit(preset("linear", None)), engine_rates.simulate
 
     def kept(*arguments, **options):

@@ -21,7 +21,7 @@ def test_vtk_draws_the_same_picture():
     assert name
     frame = render(scene, "phong", REFLECTION_MODELS["phong"])
     assert frame.mask.mean() > 0.2
-    # Rounding to 8 bits is 0.25 in the mean. Pixels on silhouettes may be decided either way.
+    # Rounding to 8 bits is 0.25 in the mean. Pixels on silhouettes may differ.
     difference = np.abs(frame.image * 255 - drawn)[frame.mask]
     assert difference.mean() < 0.5
     assert (difference > 2).mean() < 0.01
@@ -32,7 +32,7 @@ def test_report_and_exit_status(monkeypatch, capsys):
     monkeypatch.setattr(
         renderer_times, "vtk_image", lambda scene: (lambda: np.zeros((12, 16, 3), np.uint8), "nothing")
     )
-    # What this process has does not count.
+    # Memory that this process already has does not count.
     held = np.ones(2**28, dtype=np.uint8)
     assert renderer.main(SMALL) == 0
     del held
@@ -71,7 +71,7 @@ def test_without_vtk(monkeypatch, capsys):
 
 
 def test_fastest_run_counts(monkeypatch):
-    # Runs of 5, 3 and 4 s by the clock with 1, 2 and 7 s of processor time.
+    # Runs of 5, 3 and 4 s by the clock, with 1, 2 and 7 s of processor time.
     wall, processor = iter([0, 5, 5, 8, 8, 12]), iter([0, 1, 1, 3, 3, 10])
     clock = SimpleNamespace(perf_counter=lambda: next(wall), process_time=lambda: next(processor))
     monkeypatch.setattr(renderer_times, "time", clock)

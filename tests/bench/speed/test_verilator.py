@@ -1,4 +1,5 @@
-"""Verilator's model of the emitted Verilog: equal beats at equal cycles, and one line where there is none."""
+"""Verilator's model of the emitted Verilog: equal beats in equal cycles, and one line if there is no
+Verilator."""
 
 import dataclasses
 import re
@@ -60,7 +61,7 @@ class Sums(Component):
 
 @pytest.fixture(autouse=True)
 def _quick(monkeypatch):
-    """Speed is not the question here, and Verilator's runtime takes long to optimise."""
+    """This test does not need speed, and Verilator's runtime takes long to optimise."""
     quick = [
         dataclasses.replace(each, compile=tuple("-O0" if flag == "-O2" else flag for flag in each.compile))
         for each in find_compilers()
@@ -103,7 +104,7 @@ def test_equal_to_the_engine(tmp_path):
     between, cycles = model.run(drive(model.ports, beats, write, 300, write_after=late))
     assert np.array_equal(between, pack(model.ports.o, run.beats))
     assert np.array_equal(cycles, run.cycles)
-    # From power-up every time; a beat that never comes ends the run.
+    # Each run starts from power-up. A beat that never comes ends the run.
     assert np.array_equal(model.run(drive(model.ports, beats, write, 300))[0], output)
     with pytest.raises(SimulationError, match=r"^Verilator's model gave nothing for 100 cycles$"):
         model.run(drive(model.ports, beats, write, 301))

@@ -10,7 +10,8 @@ from .stubs import NEXUS_REPORT, REPORT, netlist
 
 
 class Calls(list):
-    """Tools that were called, each with its last argument; the cells that Yosys finds, all arguments."""
+    """The tools that were called, each with its last argument; and the cells that Yosys finds, with all
+    arguments."""
 
     cells = (("TRELLIS_FF", {}, 3, 4),)
     arguments = ()
@@ -18,7 +19,7 @@ class Calls(list):
 
 @pytest.fixture
 def calls(monkeypatch):
-    """Stands for the tools: writes what they would, notes what was called."""
+    """Stubs of the tools, which write the same files and note their calls."""
     calls = Calls()
 
     def run(self, name, code, arguments, folder, text="", given_up=None):

@@ -1,5 +1,5 @@
 # amaranth: UnusedElaboratable=no
-"""Components, netlists and reports that stand for those of Yosys and nextpnr."""
+"""Components, netlists and reports in place of those of Yosys and nextpnr."""
 
 from amaranth.hdl import Module, Signal, signed
 from amaranth.lib import wiring
@@ -7,7 +7,7 @@ from amaranth.lib.wiring import In, Out
 
 
 class Product(wiring.Component):
-    """A product of 18x18 bits between two registers, one multiplier; with gates before and behind it."""
+    """A product of 18x18 bits between two registers, one multiplier, with gates before and behind it."""
 
     def __init__(self, gates=False):
         super().__init__({name: In(signed(18)) for name in "abcd"} | {"e": In(signed(36)), "o": Out(36)})
@@ -87,7 +87,7 @@ MULTIPLIER = "unit.datapath.product_TRELLIS_FF_Q_3_DI_MULT18X18D_P33"
 
 LUT = "unit.sum_TRELLIS_FF_Q_2_DI_LUT4_Z"
 
-# As nextpnr writes it: a path through a multiplier, a carry and a look-up table, and one from a port.
+# As nextpnr writes it: a path through a multiplier, a carry and a look-up table, and a path from a port.
 REPORT = {
     "fmax": {"clk": {"achieved": 123.4, "constraint": 150}},
     "utilization": {"TRELLIS_COMB": {"used": 77, "available": 24288}},
@@ -111,7 +111,7 @@ REPORT = {
     ],
 }
 
-# The same of Nexus: from registers inside a multiplier, through its stages, a carry and a look-up table to a
+# The same for Nexus: from registers inside a multiplier, through its stages, a carry and a look-up table to a
 # memory.
 STAGES = "unit.product_MULT18X18_Z/"
 

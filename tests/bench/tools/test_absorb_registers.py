@@ -1,4 +1,4 @@
-"""Registers moved into multipliers: what moves, what stays, and that the netlist does the same."""
+"""Registers moved into multipliers: which move, which stay, and proofs that the netlist does the same."""
 
 import copy
 import json
@@ -18,7 +18,8 @@ pytestmark = pytest.mark.skipif(tool_versions()["pyosys"] is None, reason="pyosy
 
 
 class Beside(wiring.Component):
-    """Products of two operands, with registers as a function describes; and what that function gives out."""
+    """Products of two operands, with registers as a function describes them, and the results of this
+    function."""
 
     a: In(signed(18))
     b: In(signed(18))
@@ -73,30 +74,30 @@ def square(register, a, b, enable):
 
 
 def shared(register, a, b, enable):
-    """One register for two multipliers."""
+    """One register serves two multipliers."""
     a, b, c = register(a, "a_1"), register(b, "b_1"), register(~b, "c_1")
     return register(a * b, "p_0"), register(a * c, "p_1")
 
 
 def half_enabled(register, a, b, enable):
-    """An operand of two halves, one of them enabled."""
+    """An operand has two halves, and one of them is enabled."""
     low, high = register(a[:9], "low"), register(a[9:], "high", when=enable[0])
     return (register(Cat(low, high).as_signed() * register(b, "b_1"), "p_0"),)
 
 
 def narrow(register, a, b, enable):
-    """Operands without sign, of fewer bits: 0 above."""
+    """Operands have no sign and fewer bits, with 0 above."""
     a, b = register(a[:9], "a_1").as_unsigned(), register(b[:12], "b_1").as_unsigned()
     return (register(a * b, "p_0"),)
 
 
 def behind_logic(register, a, b, enable):
-    """One operand that may move, behind gates: as if it had no register, to nextpnr."""
+    """A register that may move is behind gates, so nextpnr treats the operand as without register."""
     return (register(register(a ^ b, "a_1") * register(b, "b_1", reset_less=False), "p_0"),)
 
 
 def chained(register, a, b, enable):
-    """One register between two multipliers: it goes into one of them."""
+    """One register is between two multipliers, and goes into one of them."""
     between = register((a * b)[18:].as_signed(), "between")
     return (register(between * register(b, "b_1"), "p_0"),)
 
@@ -142,7 +143,7 @@ def mapped(tmp_path_factory):
 
 
 class Read(wiring.Component):
-    """A table that is read under an enable, and a register behind it under another, or the same."""
+    """A table that is read with an enable. The register behind it has another enable, or the same."""
 
     address: In(9)
     enable: In(2)
@@ -182,11 +183,11 @@ READS = {
     "a value at power-up": (Read(init=5), 0),
     "another reader": (Read(also=True), 0),
 }
-"""Tables, and how many of their words have a register inside."""
+"""Tables, and the number of their words with a register inside."""
 
 
 def often(names, some):
-    """Names, for the long run; CI has some of them."""
+    """Names, for the long run. CI has some of them."""
     return [
         pytest.param(name, marks=[pytest.mark.long] + [pytest.mark.ci] * (name in some)) for name in names
     ]
@@ -220,7 +221,7 @@ def test_faults_injected_in_a_memory_are_found(fault, mapped, tmp_path):
 
 
 class Adds(wiring.Component):
-    """A sum, which loses its carry, and a comparison, which is one."""
+    """A sum, which loses its carry, and a comparison, whose result is the carry."""
 
     a: In(12)
     b: In(12)
@@ -242,7 +243,7 @@ def test_carries_that_nobody_reads(tmp_path):
     before = map_component(Adds(), tmp_path)
     after, found = absorb_registers(before)
     assert found == Absorbed(carries=1)
-    # It is not the comparison's, which a net without a driver would show.
+    # The carry is not that of the comparison; a net without a driver would show this.
     assert _unread(after) == "" != _unread(before)
     assert same({**before}, after, tmp_path) in ("", "0 of 0 nets are not shown to be equal")
 
@@ -292,7 +293,7 @@ def test_a_register_between_two_multipliers_goes_into_one(mapped, tmp_path):
 @pytest.mark.ci
 @pytest.mark.long
 def test_registers_at_ports_stay(mapped, tmp_path):
-    """They stand for those of other units."""
+    """Registers at ports stand for those of other units."""
 
     class AtPorts(wiring.Component):
         a: In(signed(18))
@@ -313,7 +314,10 @@ def test_registers_at_ports_stay(mapped, tmp_path):
 
 @pytest.mark.long
 def test_controls_of_a_multiplier(mapped):
-    """A clock, no reset, and an enable for each register; one without gets a constant."""
+    """There is a clock, no reset, and an enable for each register.
+
+    A register without enable gets a constant.
+    """
     (cell,) = multipliers(absorb_registers(mapped("three enables", Beside(CASES["three enables"][0])))[0])
     assert cell["parameters"]["RESETMODE"] == "SYNC"
     assert cell["connections"]["RST0"] == ["0"]
@@ -376,7 +380,10 @@ def test_an_inverter_that_does_not_invert_is_found(mapped, tmp_path):
 @pytest.mark.ci
 @pytest.mark.long
 def test_a_power_up_value_that_is_lost_is_found(mapped, tmp_path):
-    """The same netlist but for a register that starts at 1: what is absorbed would start at 0."""
+    """The netlist is the same, except for a register that starts at 1.
+
+    Inside a multiplier it would start at 0.
+    """
     before = mapped("no enable", Beside(CASES["no enable"][0]))
     after, _ = absorb_registers(before)
     for name, cell in before["modules"]["top"]["cells"].items():

@@ -1,4 +1,4 @@
-"""The table of the units holds every unit, measures what it prints, and errs by no more than is stated."""
+"""The table of the units has every unit, measures what it prints, and errors are within the stated bounds."""
 
 import ast
 import json
@@ -20,7 +20,8 @@ from blysk.sim.cli.main import main
 
 PROJECT = Path(__file__).parents[3]
 FEW = 4000
-# Classes of `hdl` without a record: parts that compute nothing, base classes, parts of a unit that has one.
+# Classes of `hdl` without a record: parts that compute nothing, base classes, and parts of a unit with a
+# record.
 PARTS = {
     "FrameConstantsUnit": "registers behind a write port",
     "PixelAssemblerUnit": "joins two streams",
@@ -62,7 +63,7 @@ def errors(unit, variant="", samples=FEW, seed=1):
 
 
 def check_json_equals_the_table(entries, folder):
-    """Run the command for some entries; every cell of the text is that of the file."""
+    """Run the command for some entries. Every cell of the text equals that of the file."""
     path = folder / "blocks.json"
     with pytest.MonkeyPatch.context() as patch:
         lines = []
@@ -75,14 +76,14 @@ def check_json_equals_the_table(entries, folder):
     head, *lines = text.splitlines()
     assert len(lines) == len(report["blocks"]) == len(entries)
     assert max(map(len, text.splitlines())) <= 132
-    # Columns end, or start, where the head's do.
+    # Columns end, or start, with the columns of the head.
     starts = [head.index(word) for word in ("unit", "variant", "model", "multipliers")]
     for line, entry, row in zip(lines, entries, report["blocks"], strict=True):
         assert (row["unit"], row["variant"]) == (entry.record.name, entry.name)
         assert line[: starts[1]].strip() == row["unit"]
         names, cells = line[starts[1] : starts[3]], line[starts[3] :]
         assert names.startswith(row["variant"])
-        # After the variant, the unit of the errors if there is one, then numbers.
+        # After the variant come the unit of the errors, if there is one, and then numbers.
         figures = names[len(row["variant"]) :].split()
         unit = figures.pop(0) if len(figures) == 8 else "1"
         assert unit == row["error_unit"]
@@ -117,7 +118,7 @@ def test_every_unit_has_a_record():
 @pytest.mark.ci
 @pytest.mark.long
 def test_json_equals_the_table(tmp_path):
-    """Of units with every kind of cell, and of the longest names."""
+    """For units with every kind of cell, and for those with the longest names."""
     others = (entry for entry in ENTRIES if entry not in FEW_ENTRIES)
     longest = sorted(others, key=lambda entry: len(entry.title))[-3:]
     check_json_equals_the_table([*FEW_ENTRIES, *longest], tmp_path)
@@ -162,12 +163,12 @@ def test_samples_and_decisions():
     sample = Sample(np.array([1.0, 2.0, 3.0]), np.array([1.5, 2.0, 3.0]), np.array([1.25, 2.5, 3.0]))
     assert sample.errors == sample.extremes.errors == (0.5, 0.5, 0.5)
     assert Sample(np.array([1.0, 2.0]), np.array([1.5, 2.0])).errors == (None, None, 0.5)
-    # Yes by mistake, no by mistake, both; as shares of all.
+    # Wrong yes, wrong no, and both, as shares of all decisions.
     decisions = Decisions.of(np.array([1, 1, 1, 0, 0]) > 0, np.array([1, 0, 0, 0, 1]) > 0)
     assert decisions.errors == decisions.extremes.errors == pytest.approx((0.4, 0.2, 0.6))
 
 
-# Errors: measured, published, and none by a word that wraps. Tests of the models hold their bounds.
+# Errors: measured, published, and none by a word that wraps. Tests of the models check their bounds.
 
 UNITS = [entry for entry in ENTRIES if entry.record.name != "pipeline"]
 QUICK = [e for e in UNITS if "interpolator" not in e.record.name and not e.variant.exhaustive]
@@ -177,7 +178,10 @@ PIPELINES = [entry.name for entry in ENTRIES if entry.record.name == "pipeline"]
 @pytest.mark.long
 @pytest.mark.parametrize("entry", UNITS, ids=lambda entry: entry.title)
 def test_errors_are_measured(entry):
-    """The total error is none of an exact unit alone, and no larger than model and arithmetic make it."""
+    """The total error is 0 only for an exact unit.
+
+    It is at most the sum of model error and arithmetic error.
+    """
     model, arithmetic, total = sample_of(entry, FEW, 3).errors
     assert (model is None) == (arithmetic is None)
     assert np.isfinite(total)
@@ -187,7 +191,8 @@ def test_errors_are_measured(entry):
 
 @pytest.mark.parametrize("samples", [300, pytest.param(200_000, marks=pytest.mark.long)])
 def test_no_word_wraps_in_its_domain(monkeypatch, samples):
-    """But phases of the angular setup, where 1 is a turn, and steps of attributes, which are modulo 4."""
+    """Exceptions are phases of the angular setup, where 1 is a turn, and steps of attributes, which are
+    modulo 4."""
     wraps, found = Fixed.wrap, set()
 
     def watched(number, format):
@@ -217,7 +222,7 @@ def test_same_seed_same_figures(unit):
     np.testing.assert_array_equal(first.found, again.found)
     assert first.errors == again.errors
     if entry.variant.exhaustive:
-        # Every operand is there, of the arc cosine's so many.
+        # Every operand is there, and some of the arc cosine's.
         assert unit != "arccos" or np.size(first.found) == 2**17 + 1
         np.testing.assert_array_equal(first.found, other.found)
     else:
@@ -228,10 +233,10 @@ def test_same_seed_same_figures(unit):
 @pytest.mark.parametrize("variant", PIPELINES)
 def test_pipeline(variant):
     _, arithmetic, total = errors("pipeline", variant)
-    # Half a step of the channel; steep highlights of n to 1000 add to it.
+    # Half a step of the channel; steep highlights of n up to 1000 add to it.
     assert 0.4 < arithmetic < 4
     if variant == "quotient, blinn":
-        # The very model of the reference: only the method and the arithmetic are left.
+        # The model is that of the reference, so only the method and the arithmetic make errors.
         assert total < 1
 
 

@@ -1,5 +1,5 @@
 # amaranth: UnusedElaboratable=no
-"""``blysk board``: bad input in one line, the pins of each board, what is said of clocks, a bitstream."""
+"""``blysk board``: bad input in one line, the pins of each board, texts about clocks, a bitstream."""
 
 import re
 import subprocess
@@ -34,7 +34,7 @@ PINS = {
     "ulx3s-85f": {"G2", "A16", "A14", "A12", "A17"},
     "icepi-zero": {"M1", "R13", "R15", "P16", "R12"},
 }
-"""Of the boards' schematics: clock, data pairs 0 to 2, clock pair; the positive ones."""
+"""From the boards' schematics: clock, data pairs 0 to 2, clock pair; the positive pins."""
 
 
 def pattern_on(board):
@@ -101,7 +101,7 @@ def test_missing_tools_and_loader_are_named(capsys, monkeypatch):
     "name", [next(iter(BOARDS)), *(pytest.param(name, marks=pytest.mark.long) for name in [*BOARDS][1:])]
 )
 def test_pins_of_the_board(name):
-    """Lanes stand on the connector's pins as differential pairs; the clock is constrained."""
+    """Lanes are at the connector's pins as differential pairs, and the clock is constrained."""
     if find_spec("amaranth_boards") is None:
         pytest.skip("the Python package amaranth-boards is not installed")
     board = BOARDS[name]
@@ -116,7 +116,10 @@ def test_pins_of_the_board(name):
 
 
 def test_lights_of_the_presets():
-    """The other presets' are turned by a quarter round the upright; one along it stays."""
+    """The lights of the other presets are turned by a quarter about the upright.
+
+    A light along the upright stays.
+    """
     lights = [Light(direction) for direction in ((0, 0, 1), (0, 2, 0), (3, 4, 0))]
     _, scenes = gpu_of(BOARDS["ulx3s-85f"], "teapot", {"lights": lights, "method": "renormalise"})
     given, turned = (np.array([light.direction for light in scenes[k].lights]) for k in (0, 2))
@@ -157,7 +160,10 @@ def test_a_missed_clock_is_named_with_its_path():
 
 
 def test_too_large_is_told_before_placement():
-    """All that is over, with what there is; a carry cell is two look-up tables, a small memory four."""
+    """The message has all resources that are too many, and the available number.
+
+    A carry cell is two look-up tables, a small memory four.
+    """
     kinds = {"LUT4": 24_000, "CCU2C": 141, "TRELLIS_DPR16X4": 2, "TRELLIS_FF": 100, "MULT18X18D": 29}
     cells = {f"{kind}{k}": {"type": kind} for kind, count in kinds.items() for k in range(count)}
     netlist = {"modules": {"top": {"cells": cells}}}
@@ -167,7 +173,7 @@ def test_too_large_is_told_before_placement():
 
 
 def rounds(twice):
-    """What the router says of wires that are used twice."""
+    """The router's messages about wires that are used twice."""
     return "".join(
         f"Info:     iter={k} wires=422169 overused={n} overuse={n} archfail=NA\n" for k, n in twice
     )
@@ -186,14 +192,14 @@ def rounds(twice):
 )
 def test_a_router_that_will_not_end_is_given_up(twice, says):
     said = rounds((k, int(twice(k))) for k in range(1, 130) if twice(k) is not None)
-    # What the placer says of its own rounds, and a line that has just begun.
+    # Messages of the placer about its own rounds, and a line that has just begun.
     assert _stuck(f"Info: iter=595 steplen=1.296256 a=299.9\n{said}Info:     iter=") == says
     assert _stuck("") == ""
 
 
 @pytest.mark.parametrize("name", BOARDS)
 def test_what_is_known_is_printed_before_the_build(name, capsys, monkeypatch, tmp_path):
-    """Before an hour is spent; a bitstream that was made is told of with its commit."""
+    """It is printed before an hour is spent. For a bitstream that was made it names the commit."""
     told = []
 
     def give_up(*arguments):
@@ -208,7 +214,7 @@ def test_what_is_known_is_printed_before_the_build(name, capsys, monkeypatch, tm
 
 
 def test_figures_are_no_json(capsys, tmp_path):
-    """Told before the work, and left as it is."""
+    """This is told before the work, and the file does not change."""
     path = tmp_path / "x.json"
     path.write_text("[1]")
     assert main(["board", "ulx3s-25f", "--simulate", "1", "-o", "x", "--record", str(path)]) == 2
@@ -219,14 +225,17 @@ def test_figures_are_no_json(capsys, tmp_path):
 
 
 def test_tables_of_the_page_are_the_figures():
-    """As ``board_tables.py`` makes them of ``board.json``."""
+    """The tables are those that ``board_tables.py`` makes from ``board.json``."""
     guide = Path(__file__).parents[3] / "docs" / "guide"
     subprocess.run([sys.executable, guide / "board_tables.py", "--check"], check=True)
 
 
 @pytest.mark.long
 def test_bitstream_of_a_pattern():
-    """Placed with the board's pins: every clock and every crossing is met; it reads back."""
+    """A pattern is placed with the board's pins.
+
+    Every clock and every crossing is met, and the bitstream reads back.
+    """
     if find_spec("amaranth_boards") is None or None in tool_versions().values():
         pytest.skip("the tools of the extra board are not installed")
     board = BOARDS["ulx3s-25f"]
@@ -245,7 +254,7 @@ def test_bitstream_of_a_pattern():
 
 
 def test_the_default_of_a_small_board_has_its_block_rams(monkeypatch):
-    """The memories of the whole drawing, each as the fewest block RAMs of one shape, fit the device."""
+    """The memories of the whole drawing, each in the fewest block RAMs of one shape, fit the device."""
     found, make = [], Memory.__init__
 
     def counted(memory, *arguments, **options):
@@ -255,7 +264,7 @@ def test_the_default_of_a_small_board_has_its_block_rams(monkeypatch):
     monkeypatch.setattr(Memory, "__init__", counted)
     board = BOARDS["ulx3s-25f"]
     Fragment.get(GpuUnit(planned(board, "teapot", {}, None, 52.5)[0]), None)
-    # Shorter memories are of look-up tables. So are the coordinates beside shading, see `board_build`.
+    # Shorter memories are look-up tables. So are the coordinates beside shading, see `board_build`.
     found.remove((64, 25))
     blocks = [block_rams(depth, width) for depth, width in found if depth >= 64]
     assert len(blocks) > 10

@@ -1,5 +1,5 @@
 # amaranth: UnusedElaboratable=no
-"""Place and route: what is counted, what is timed, what is kept, and what is refused."""
+"""Place and route: counts, times, stored results, and refusals."""
 
 import json
 import os
@@ -46,7 +46,7 @@ def test_command_goes_on_after_what_does_not_fit(calls, cache, tmp_path, capsys,
 
 @pytest.mark.long
 def test_cores_that_take_triangles(calls, cache, capsys, monkeypatch):
-    """Each is named by what it does."""
+    """Each core is named by its function."""
     placed = []
 
     def place(name, unit, *others):
@@ -140,7 +140,7 @@ def test_command(options, family, calls, cache, tmp_path, capsys):
     ],
 )
 def test_device_by_the_number_of_pipelines(options, device, capsys, monkeypatch):
-    """Several take the larger device, unless another is asked for."""
+    """Several pipelines take the larger device, unless another is given."""
 
     def lays_out(name, unit, seeds, jobs, progress, family, absorb):
         return Layout(name, Parts(1, 2, 3, 4, 5), (Place(1, 130.0, "a", "b", 4.0, 3.0, {}),))

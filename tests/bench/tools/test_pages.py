@@ -1,4 +1,4 @@
-"""Pages of the units: text as docstrings and records have it, drawings of what was measured."""
+"""Pages of the units: text from docstrings and records, drawings of measurements."""
 
 import re
 from collections import Counter
@@ -84,7 +84,7 @@ Source: [T] 2.1."""
 
 
 def drawn(samples, names=("",), axis="angle"):
-    """Visible panels of a drawing of errors, and its curves by name, a dictionary a panel."""
+    """Visible panels of a drawing of errors, and its curves by name, a dictionary for each panel."""
     variants = {name: Variant(None, as_published="as published" in name) for name in names}
     record = Record("made_up", "", "", variants, None, {}, axis=axis)
     figure = draw_errors([Entry(record, name) for name in names], samples)
@@ -103,7 +103,7 @@ def test_error_plot_shows_the_largest_error():
     assert np.nanmax(total) == 0.25
     assert np.count_nonzero(total == 0.25) == 1
     np.testing.assert_allclose(lines["model"].get_ydata(), 1e-5)
-    # Results that two variants share are drawn once, under what their names share.
+    # Results that two variants share are drawn once, under the common part of their names.
     _, panels, _ = drawn(
         [Sample(found, exact, None, at)] * 2, ("refitted, pipelined", "refitted, sequential")
     )
@@ -163,7 +163,7 @@ def chain(*operations, width=18, suffix=""):
 def test_structures_of_one_kind_share_a_drawing():
     first = likeness(chain("×", "+", "mux"))
     assert likeness(chain("×", "+", "mux", width=20, suffix="_0")) == first
-    # Order counts, so does a choice in the place of data, and a product by a constant does not.
+    # Order counts, and so does a choice in place of data. A product by a constant does not.
     assert likeness(chain("+", "×", "mux")) != first
     chosen = chain("×", "+", "mux")
     chosen.edges[0, 1] = False
@@ -181,7 +181,7 @@ def test_a_page_has_all_of_its_record_and_the_same_bytes_each_time(tmp_path):
     for name in ("one", "two"):
         folder = tmp_path / name
         folder.mkdir()
-        # A picture of this page that it no longer has, and files that are not its own.
+        # A picture that this page no longer has, and files that do not belong to the page.
         for file in ("diffuse-structure-9.svg", "diffuse_2-structure.svg", "diffuse-own.svg"):
             (folder / file).touch()
         write_pages(folder, ["diffuse"], samples=1000)
@@ -210,11 +210,11 @@ def test_a_page_has_all_of_its_record_and_the_same_bytes_each_time(tmp_path):
 @pytest.mark.long
 @pytest.mark.parametrize("unit", RECORDS)
 def test_every_unit_has_a_page(unit, tmp_path, monkeypatch):
-    """Of its first variant and its last; baselines and errors are measured of every variant."""
+    """The page has the first variant and the last. Baselines and errors are measured for every variant."""
     shown = entries_shown(unit)
     monkeypatch.setattr(pages, "entries_shown", lambda _: shown[:1] + shown[1:][-1:])
     for name in ("_graph", "_structures"):
-        # What pages of all variants have kept is not theirs.
+        # Data that pages of all variants have kept does not belong to this page.
         monkeypatch.setattr(pages, name, cache(getattr(pages, name).__wrapped__))
     write_pages(tmp_path, [unit], samples=1000)
     text = (tmp_path / f"{unit}.md").read_text(encoding="utf-8")
@@ -224,7 +224,7 @@ def test_every_unit_has_a_page(unit, tmp_path, monkeypatch):
 
 
 def test_the_folder_is_made_and_a_bad_one_is_one_line(tmp_path):
-    """Where it cannot be made the line names it; nothing is left behind."""
+    """If the folder cannot be made, one line names it, and no file is left."""
     write_pages(tmp_path / "new" / "pages", [])
     assert (tmp_path / "new" / "pages" / "README.md").is_file()
     (tmp_path / "file").touch()
@@ -234,7 +234,7 @@ def test_the_folder_is_made_and_a_bad_one_is_one_line(tmp_path):
 
 @pytest.mark.parametrize("name", ["README.md", "diffuse.md"])
 def test_pages_of_somebody_else_stay(tmp_path, name):
-    """A first page that is none of ours, or a page of a unit in a folder without one."""
+    """A first page that blysk did not write, or a page of a unit in a folder without a first page."""
     (tmp_path / name).write_text("# Mine\n")
     with pytest.raises(InputError, match=f"{name}: would be replaced, and `blysk pages` did not write it"):
         write_pages(tmp_path, ["diffuse"], samples=1000)

@@ -1,5 +1,5 @@
 # amaranth: UnusedElaboratable=no
-"""Parts by unit: what is counted where, and that nothing is lost."""
+"""Parts by unit: the unit to which each part counts, and that no part is lost."""
 
 import json
 from dataclasses import astuple, replace
@@ -31,7 +31,7 @@ _CELLS = {
 
 
 def test_cells_belong_to_the_innermost_unit_of_three_names(monkeypatch):
-    """A register at a port is not counted; a signal's name is not taken for a unit's."""
+    """A register at a port is not counted. A signal's name is not taken for a unit's name."""
     paths = ("a", "a.b", "a.b.datapath", "a.b.c", "a.b.c.d", "empty")
     netlist = "".join(f"module \\top.unit.{path}\n" for path in paths)
     mapped = {
@@ -58,7 +58,7 @@ def test_cells_belong_to_the_innermost_unit_of_three_names(monkeypatch):
 @pytest.mark.long
 @tools
 def test_units_have_all_parts_of_the_design(tmp_path):
-    """Of a light: its diffuse and specular units, and what is between them."""
+    """Units of a light: its diffuse and specular units, and the parts between them."""
     found = parts_by_unit(LightUnit())
     assert {"diffuse", "specular"} < set(found)
     netlist = rtlil.convert(Registered(LightUnit()), name="top", emit_src=False)

@@ -1,5 +1,5 @@
 # amaranth: UnusedElaboratable=no
-"""Place and route: what is counted, what is timed, what is kept, and what is refused."""
+"""Place and route: counts, times, stored results, and refusals."""
 
 import time
 
@@ -77,7 +77,7 @@ def test_registers_at_ports_are_not_counted():
     assert found == Parts(77, 1, 1, 0, 0)
     found = parts_of(netlist(("DP16KD", {}, 8, 9), ("TRELLIS_DPR16X4", {}, 8, 9)), REPORT)
     assert found == Parts(77, 0, 0, 1, 1)
-    # A constant is no net of the port that has one.
+    # A constant does not count as a net of the port.
     assert parts_of(netlist(("TRELLIS_FF", {}, "0", 9)), REPORT).flip_flops == 1
 
 
@@ -174,7 +174,7 @@ def test_what_is_cached_runs_no_tool(calls, cache):
     )
     assert not calls
     assert len(ticks) == 3
-    # A seed more is placed alone; a damaged entry again.
+    # A further seed is placed alone, and a damaged entry is placed again.
     lay_out("counter", Counter(), 4)
     assert calls == [("Yosys",), ("nextpnr", "4")]
     calls.clear()
@@ -188,7 +188,7 @@ def test_what_is_cached_runs_no_tool(calls, cache):
     ("luts", "placer"), [(place_and_route._LARGE - 1, ()), (place_and_route._LARGE, ECP5.large)]
 )
 def test_placer_by_size(luts, placer, calls, cache):
-    """Hardly any logic would never end in the static placer."""
+    """With hardly any logic the static placer would never end."""
     calls.cells = [("LUT4", {}, 3, 4)] * luts
     lay_out("counter", Counter(), 1)
     given = calls.arguments
@@ -215,7 +215,7 @@ def rounds(*slack):
     ],
 )
 def test_a_router_that_does_not_end_is_asked_for_less(slack, is_stuck, calls, cache, monkeypatch):
-    """Where a target cannot be met at all, its slow paths are not routed again and again."""
+    """If a target cannot be met at all, its slow paths are not routed again and again."""
     run, given = place_and_route.ToolRunner.run, []
 
     def talks(self, name, code, arguments, folder, text="", given_up=None):
@@ -287,7 +287,7 @@ def test_stopped_runner_ends_what_runs(tmp_path):
 
 
 def period(place):
-    """A path is the clock's period, to the rounding of the report."""
+    """The period of a path is the clock's period, up to the rounding of the report."""
     return pytest.approx(1000 / place.fmax, rel=1e-3) == place.logic + place.routing
 
 
@@ -314,7 +314,7 @@ def test_parts_and_time_of_a_counter(family, kinds, cache, monkeypatch):
     assert counter.parts.multipliers == counter.parts.block_rams == 0
     assert "multiplier" not in counter.places[0].kinds
     assert period(counter.places[0])
-    # What nextpnr says that the device has.
+    # nextpnr's message about the parts of the device.
     available = [reports[0]["utilization"][kind]["available"] for kind in kinds]
     assert Parts(*available) == family.capacity
 
@@ -331,14 +331,17 @@ def test_parts_and_times_of_a_product(cache):
         assert {place.start} <= {"a", "b"}
         assert place.end.startswith("o.")
         assert period(place)
-        # One 18x18 multiplier's ceiling, out of a placement of nothing else.
+        # The limit of a single 18x18 multiplier, from a placement with nothing else.
         assert 120 < place.fmax < 180
 
 
 @pytest.mark.long
 @tools
 def test_times_of_a_multiplier_with_absorbed_registers(cache):
-    """Registers on one side: the multiplier is timed in full. On both sides: its interior is not."""
+    """With registers on one side the multiplier is timed in full.
+
+    With registers on both sides its interior is not timed.
+    """
     for before, behind, lowest, highest in (
         (0, 0, 120, 160),
         (1, 0, 170, 220),
@@ -393,7 +396,7 @@ def test_what_the_tools_refuse_is_one_line(cache, monkeypatch):
 
 
 def test_a_tool_is_ended_by_what_it_says(tmp_path, monkeypatch):
-    """It writes on meanwhile: a look at what it has said does not move where it writes."""
+    """The tool writes meanwhile. Reading its output does not change where it writes."""
     monkeypatch.setattr(tool_runner, "_SECONDS", 0.05)
     seen = []
 
@@ -413,7 +416,7 @@ def test_a_tool_is_ended_by_what_it_says(tmp_path, monkeypatch):
 
 
 def test_text_reaches_a_tool_that_takes_its_time(tmp_path, monkeypatch):
-    """Longer than the time between two looks."""
+    """The text takes longer than the time between two reads."""
     monkeypatch.setattr(tool_runner, "_SECONDS", 0.05)
     code = "import time, sys, pathlib; time.sleep(1); pathlib.Path('x').write_text(sys.stdin.read())"
     text = "word " * 100_000

@@ -1,5 +1,5 @@
 # amaranth: UnusedElaboratable=no
-"""Structures: read right from a component made for it, and complete for the devices."""
+"""Structures: read right from a component made for this test, and complete for the units."""
 
 from functools import cache
 from itertools import pairwise
@@ -31,7 +31,7 @@ from blysk.hdl.normals.quadratic_evaluator import QuadraticEvaluatorUnit
 
 @cache
 def structure_of(unit):
-    """A unit's structure, to be looked at only."""
+    """A unit's structure, which is only read."""
     return graph_of(unit())
 
 
@@ -82,7 +82,7 @@ def by_name(graph):
 def test_sample():
     graph = graph_of(Sample())
     nodes = by_name(graph)
-    # Nothing of the control, no box twice.
+    # No part of the control is drawn, and no box twice.
     assert set(nodes) == {"a", "b", "which", "product", "chosen", "total", "late", "products", "table"}
     kinds = {name: node.kind for name, (_, node) in nodes.items()}
     assert kinds["a"] == kinds["b"] == kinds["which"] == "input"
@@ -107,7 +107,7 @@ def test_sample():
     assert edges[number["a"], number["product"]]
     assert edges[number["table"], total]
     assert edges[total, total]
-    # What only chooses is told from what is chosen.
+    # A signal that only chooses is distinguished from the chosen data.
     assert edges[number["which"], number["chosen"]] is False
     assert edges[number["a"], number["chosen"]]
     assert (number["product"], number["product"]) not in edges
@@ -130,7 +130,7 @@ def test_parts_are_those_of_the_netlist(unit):
             assert kind == "ROM"
             bits += int(depth) * int(width)
     assert bits == cost.rom_bits
-    # No register is made up; those of the control are left out.
+    # No register is invented. Registers of the control are left out.
     shown = sum(int(n.detail) * n.copies * n.stages for n in graph.nodes.values() if n.kind == "register")
     assert 0.5 * cost.register_bits < shown <= cost.register_bits
 
@@ -227,7 +227,7 @@ def test_large_structures_are_cut_down():
     ],
 )
 def test_every_adder_is_drawn(unit):
-    """Those that count the cycles of a unit are control."""
+    """Adders that count the cycles of a unit are control."""
 
     def adders(graph):
         return sum(node.copies * node.operations[s] for node in graph.nodes.values() for s in ("+", "−"))
@@ -242,7 +242,7 @@ def test_boxes_have_formulas():
     assert {"N_a,x·N_b,x", "N_a,z·N_b,z"} <= set(shown["multiplier_0_product"])
     assert shown["half_sum_0"] == ("(N_a,x + N_b,x)/2",)
     assert shown["u"] == ("u = 1 − N_a·N_b",)
-    # A multiplier that is shared has all its uses; none has the name of its instance alone.
+    # A shared multiplier shows all its uses. None has only the name of its instance.
     assert all(node.formulas for node in nodes if node.operations["×"])
     assert [node.formulas for node in structure_of(DotProductUnit).nodes.values() if node.name == "sum"] == [
         ("a·b",)
@@ -280,7 +280,7 @@ def test_a_wide_drawing_is_folded():
     assert sorted(number for band in bands for number in band.graph.nodes if number in graph.nodes) == list(
         range(40)
     )
-    # An arrow is in a band, or it ends at a tag and starts at one of the same text.
+    # An arrow stays in a band, or ends at a tag and starts at a tag of the same text.
     ways = {}
     leaves, arrives = {}, []
     for band in bands:
@@ -293,7 +293,7 @@ def test_a_wide_drawing_is_folded():
                 arrives.append((band.graph.nodes[a].name, b, is_data))
     ways |= {(leaves[text], b): is_data for text, b, is_data in arrives}
     assert ways == graph.edges
-    # No tag's number is another's.
+    # No two tags have the same number.
     assert len({text.split()[0] for text in leaves}) == len(leaves) == len(bands) + 1
     assert draw_structure(graph).get_size_inches()[0] * 72 < 1.15 * _WIDEST
 

@@ -1,4 +1,4 @@
-"""Timing diagrams: they show what the units do, and break no rule of a stream."""
+"""Timing diagrams show the behaviour of the units, and break no rule of a stream."""
 
 import numpy as np
 import pytest
@@ -30,7 +30,7 @@ def test_times_are_those_of_the_unit(unit):
     inputs, outputs = moves(waves, "i"), moves(waves, "o")
     assert inputs[0] == 0
     assert [waves.inputs[k] for k in inputs] == [waves.outputs[k] for k in outputs] == ["A", "B", "C"]
-    # The first result is there after the latency, and waits for two cycles.
+    # The first result comes after the latency, and waits for two cycles.
     assert np.flatnonzero(waves.levels["o.valid"])[0] == unit.latency
     assert outputs[0] == unit.latency + 2
     assert inputs[1] == unit.initiation_interval
@@ -51,7 +51,7 @@ def test_rules_of_a_stream(unit, beat):
         waits = np.flatnonzero(valid & ~ready)
         assert all(valid[k + 1] and names[k + 1] == names[k] for k in waits)
         assert [name is not None for name in names] == valid.tolist()
-    # Both kinds of stall are there.
+    # Both kinds of stall occur.
     assert np.count_nonzero(~waves.levels["o.ready"]) == 2
     offered = np.flatnonzero(waves.levels["i.valid"])
     last = next(k for k, name in enumerate(waves.inputs) if name == "C")
@@ -71,7 +71,7 @@ def test_drawing_leaves_out_quiet_cycles():
 
 
 def test_results_that_do_not_come():
-    # A span of no pixels gives none, and the diagram has none to show.
+    # A span without pixels gives none, and the diagram has none to show.
     unit = DifferenceAccumulatorUnit()
     with pytest.raises(RuntimeError, match="gave 0 of 3 results"):
         waves_of(unit, {})

@@ -19,12 +19,15 @@ def live_site(tmp_path_factory):
 
 @pytest.fixture
 def open_page(watching, live_site):
-    """Open the page and wait for its first frame; afterwards there was no error, and no request left it."""
+    """Open the page and wait for its first frame.
+
+    Afterwards there may be no error, and no request may have left the page.
+    """
     folders = []
     with watching() as (new_page, errors, requests):
 
         def open_page(width="desktop", script=None, waits=True, folder=live_site, **options):
-            # Else the light turns.
+            # Otherwise the light turns.
             page = new_page(WIDTHS[width], 30, **{"reduced_motion": "reduce"} | options)
             if script:
                 page.add_init_script(script)

@@ -1,5 +1,5 @@
 # amaranth: UnusedElaboratable=no
-"""A live page in a browser: its controls, its pictures, and what they should be."""
+"""A live page in a browser: its controls, its pictures, and the expected pictures."""
 
 import base64
 import hashlib
@@ -118,7 +118,7 @@ def figure(page, name):
 
 
 def looked_at(page):
-    """Look inside a pixel of a bright place; the page's words about it."""
+    """Look inside a pixel of a bright place; the words that the page shows for it."""
     frame = picture_of(page).sum(axis=-1).astype(float)
     y, x = np.unravel_index(frame.argmax(), frame.shape)
     page.locator("#frame").scroll_into_view_if_needed()

@@ -1,4 +1,5 @@
-"""Guide, theory and pages of units on a phone: no line is wider than the window, but inside its own box."""
+"""Guide, theory and pages of units on a phone: no line is wider than the window, except inside its own
+box."""
 
 from pathlib import Path
 
@@ -16,7 +17,7 @@ TOO_WIDE = "() => document.documentElement.scrollWidth - document.documentElemen
 
 
 def test_every_page_fits_a_phone(watching, tmp_path):
-    """A page of a unit and of a source, too."""
+    """A page of a unit and a page of a source, too."""
     write_pages(tmp_path / "pages", ["dot_product"], samples=500)
     texts, pictures = documents(web_folder.folders_of(tmp_path / "pages"))
     texts["style.css"] = web._read("report.css") + web._read("web/site.css")
@@ -35,5 +36,5 @@ def test_every_page_fits_a_phone(watching, tmp_path):
     assert len(wide) > 25
     assert any(name.startswith("source/") for name in wide)
     assert not {name: by for name, by in wide.items() if by > 0}
-    # The index shows a picture of every unit, and here is one unit.
+    # The index shows a picture of every unit, and here there is one unit.
     assert all("ERR_FILE_NOT_FOUND" in error for error in errors)

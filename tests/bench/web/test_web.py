@@ -1,4 +1,4 @@
-"""The site of ``blysk web``: its data, its files, its command; no browser."""
+"""The site of ``blysk web``: its data, its files, its command, without a browser."""
 
 import base64
 import json
@@ -32,7 +32,7 @@ DESIGNS = [("quotient", "blinn"), ("quadratic", "cosquad"), ("linear", "exp")]
 
 
 def unpacked(data):
-    """Codes by column, and which fragments show: what the page does, from what the page is told."""
+    """Codes by column, and which fragments show, found as the page finds them, from the data of the page."""
     raw = zlib.decompress(data)
     count, fragments = np.frombuffer(raw[:8], "<u4").tolist()
     at, codes = 8, {}
@@ -95,7 +95,8 @@ def test_streams_of_a_view():
         method: [len(unpacked(base64.b64decode(found["data"][k]))[0]["x"]) for k in numbers]
         for method, numbers in found["streams"].items()
     }
-    # No span of quotient is cut for an exponent; their ends are those of the true line, the longer one as 1.
+    # No span of quotient is cut for an exponent. Its ends are those of the true line, with the longer end as
+    # 1.
     first, second = found["streams"]["quotient"]
     assert first == second
     codes, _ = unpacked(base64.b64decode(found["data"][first]))
@@ -129,7 +130,7 @@ def test_addresses_are_those_of_the_write_port():
 
 @pytest.fixture(scope="module")
 def probes():
-    """Of all modules of the page."""
+    """Probes of all modules of the page."""
     return [
         probe
         for pair in web_designs.DESIGNS
@@ -145,7 +146,7 @@ def script():
 
 
 def names_in(braces):
-    """Names in an object that a script writes down, those of objects spread out in it too."""
+    """Names in an object that a script writes down, with those of objects spread into it."""
     values = re.compile(r"\([^()]*\)|\[[^\[\]]*\]")
     entries = re.split(r"[,{}]", values.sub("", braces))
     return [name for entry in entries if (name := entry.partition(":")[0].strip()) not in ("", "...")]
@@ -164,7 +165,7 @@ def test_dark_words_are_probes(script, probes):
     (names,) = re.findall(r"const isDark = (\[.*?\])", script)
     dark = set(json.loads(names))
     assert dark <= {probe.name for probe in probes}
-    # All words of the specular data path that are numbers: under the gate they are of another pixel.
+    # All words of the specular data path that are numbers. Under the gate they belong to another pixel.
     assert dark == {probe.name for probe in probes if probe.block == "specular" and probe.name != "specular"}
 
 
@@ -184,7 +185,7 @@ def test_every_block_has_a_stage(script, probes, monkeypatch):
     assert {stage_of.get(block, block) for block in blocks} == stages
 
 
-# The site, of modules that are none.
+# The site, made of stubs for modules.
 
 
 @pytest.fixture(scope="module")
@@ -291,14 +292,14 @@ def test_report_in_the_site(tmp_path, work, results):
     web.write_site(tmp_path / "site", work, results, report)
     assert (tmp_path / "site" / "report" / "a.csv").read_text() == "1,2\n"
     assert 'href="report/index.html"' in (tmp_path / "site" / "index.html").read_text()
-    # Without it the link and the files go.
+    # Without it the link and the files disappear.
     web.write_site(tmp_path / "site", work, results)
     assert not (tmp_path / "site" / "report" / "a.csv").exists()
     assert "report/index.html" not in (tmp_path / "site" / "index.html").read_text()
 
 
 def test_documents_in_the_site(tmp_path, work, results):
-    """Pages link each other; what leads out of them becomes text."""
+    """Pages link each other. A link that leads out of them becomes text."""
     guide, pages = tmp_path / "guide", tmp_path / "pages"
     for folder in (guide, pages):
         folder.mkdir()
@@ -314,7 +315,7 @@ def test_documents_in_the_site(tmp_path, work, results):
     use = (site / "guide" / "use.html").read_text()
     assert '<h1 id="to-use-it">To use it</h1>' in use
     assert '<a href="../blocks/unit.html#a-b-c">a</a> b <a href="#to-use-it">c</a>' in use
-    # By where the files lie; a source has a page of its own.
+    # By the places of the files. A source has a page of its own.
     assert '<a href="../source/bench.web.web.py.html">d</a> <a href="../blocks/unit.html">e</a>' in use
     assert "&quot;&quot;&quot;" in (site / "source" / "bench.web.web.py.html").read_text()
     assert (site / "guide" / "index.html").read_text() == use
@@ -328,7 +329,7 @@ def test_documents_in_the_site(tmp_path, work, results):
 
 
 def test_every_link_of_the_site_leads_somewhere(tmp_path, work, results):
-    """Files, and anchors in them; the answers of a report stand on the front page."""
+    """Files, and anchors in them. The front page has the answers of a report."""
     report = tmp_path / "report"
     report.mkdir()
     conclusion = {"title": "What?", "sentence": "**This** much."}
@@ -448,7 +449,7 @@ def test_command_interrupted(tmp_path, monkeypatch):
 
 @pytest.mark.long
 def test_interrupt_leaves_nothing_behind(interrupted):
-    """A worker in the midst of a program of its own, with files of its own."""
+    """A worker is interrupted in the midst of a program of its own, with its own files."""
     status, text = interrupted(
         "import subprocess, sys, tempfile\n"
         "from blysk.bench.web import web\n"

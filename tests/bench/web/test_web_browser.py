@@ -52,7 +52,7 @@ def test_first_frame_is_that_of_the_native_engine(open_page):
 
 
 def test_true_phong_follows_the_light(open_page):
-    """Of a light that moves the vectors of all spans are others; no spans are loaded again."""
+    """For a light that moves, the vectors of all spans change. No spans are loaded again."""
     page = open_page()
     blinn = digest(picture_of(page))
     use(page, "quotient", "phong")
@@ -96,7 +96,7 @@ def test_every_module_gives_the_frame_of_the_native_engine(open_page):
         if web_data.design_of(method, model).gate:
             assert figure(page, "gated") == run.status["gated_pixels"], (method, model)
         digests.add(shown)
-    # Those that differ by their arithmetic do so in some pixel: none is shown for another.
+    # Designs that differ in their arithmetic differ in some pixel, so none is shown for another.
     assert len(digests) > len(DESIGNS) // 2
 
 
@@ -148,7 +148,7 @@ def test_every_control_changes_the_frame(open_page):
         state = state_of(page)
         assert state["view" if control == "view-number" else control] == value
         assert digest(by_model(state)) == digest(image), control
-    # A method without the model takes one that it has; the page offers no other.
+    # If a method does not have the model, the page takes a model that it has, and offers no other.
     assert state["model"] == "cosquad"
     assert page.locator("#model option[value=exp]").is_disabled()
     assert page.locator("#view-number").is_hidden()
@@ -160,7 +160,7 @@ def test_every_control_changes_the_frame(open_page):
 
 
 def test_constants_are_those_of_python(open_page):
-    """Quantised vectors, colours and the words of the write port, to the bit."""
+    """Quantised vectors, colours and the words of the write port are equal to the bit."""
     page = open_page()
     use(page, "quadratic", "cosquad")
     rng = np.random.default_rng(8)
@@ -180,7 +180,7 @@ def test_constants_are_those_of_python(open_page):
             }
             | {"exponent": int(rng.integers(1, 1001)), "ambient": ks[0], "diffuse": ks[1], "specular": ks[2]}
         )
-    # A light straight behind: there is no half-way vector.
+    # A light straight behind has no half-way vector.
     viewer = web_data.scene_of(states[0]).camera.viewer
     states.append(states[0] | {"direction": list(-viewer)})
     script = """async states => {
@@ -240,14 +240,15 @@ def test_reference_is_that_of_golden(open_page, reference):
             golden = encode(shade_spans(scene, raster, design.interpolator.exact_normals, reflection))
         mask = visible_mask(scene, raster)
         figures = error_figures(picture_of(page), golden * 255, mask)
-        # The lengths of exact normals are sent to 19 bits of their logarithm.
+        # The lengths of exact normals are sent with 19 bits of their logarithm.
         assert figure(page, "largest") == pytest.approx(figures.max_lsb, abs=2e-4)
         assert figure(page, "p999") == pytest.approx(figures.p999_lsb, abs=2e-4)
         shown = picture_of(page, "golden").astype(float)
         assert np.abs(shown - golden * 255)[mask].max() <= 0.5 + 2e-4
         errors = np.abs(picture_of(page) - golden * 255).max(axis=-1)
         colors = np.array(web.map_colors())
-        # Equal steps to the largest error of the frame; one near the end of a step may be on either side.
+        # Equal steps up to the largest error of the frame. An error near the end of a step may be on either
+        # side.
         steps = np.array([[errors + d] for d in (-1e-3, 1e-3)]) / figures.max_lsb * len(colors)
         low, high = np.clip(np.ceil(steps[:, 0]).astype(int) - 1, 0, len(colors) - 1)
         shown = picture_of(page, "errors")
@@ -260,7 +261,7 @@ def test_reference_is_that_of_golden(open_page, reference):
 
 
 def test_every_curve_and_model_in_float64(open_page):
-    """Also those whose modules this site has not got."""
+    """Also curves and models whose modules this site does not have."""
     page = open_page()
     from blysk.golden.presets import MODELS
     from blysk.golden.reference.curves import CURVES, interpolate

@@ -1,5 +1,5 @@
 # amaranth: UnusedElaboratable=no
-"""The live page from inside: words of the pipeline, steps, keyboard, windows, servers, what is missing."""
+"""The live page from inside: words of the pipeline, steps, keyboard, windows, servers, missing parts."""
 
 import base64
 import dataclasses
@@ -40,7 +40,7 @@ pytestmark = pytest.mark.long
 
 
 def traced(page, component):
-    """Status of pysim on the cycles of the page's trace."""
+    """Status of pysim in the cycles of the page's trace."""
     inside = page.evaluate(
         """() => {
             const {from, to, span, start, length, firstClock, lastClock, clock} = blysk.inside;
@@ -94,7 +94,7 @@ def test_waveform_is_that_of_pysim(open_page, design):
         for name in WATCHED[design]:
             shown = page.locator(f"#wave tr[data-word={name}]").evaluate(cells)
             assert int(shown[str(clock)]) == int(row[name]), (clock, name)
-    # The pixel that was clicked comes out with the colour that the picture has.
+    # The clicked pixel comes out with the colour of the picture.
     pixel = picture_of(page)[y, x]
     place = page.evaluate("([x, y]) => blysk.inside.spans.codes.x[blysk.inside.span]", [x, y])
     clock = int(run.cycles[own][x - place])
@@ -104,7 +104,7 @@ def test_waveform_is_that_of_pysim(open_page, design):
 
 
 def test_exact_values_are_near(open_page):
-    """On every clock, each word that belongs to a pixel is what its exact value says, to some steps."""
+    """In every cycle each word of a pixel equals its exact value, up to some steps."""
     page = open_page()
     designs = ("quotient", "blinn"), ("quotient", "phong"), ("quadratic", "cosquad"), ("renormalise", "exp")
     for method, model in (*designs, ("linear", "cosquad")):
@@ -130,7 +130,7 @@ def test_exact_values_are_near(open_page):
         assert ("square" in names) == (model == "cosquad")
         assert max(row[4] for row in found if row[0] == "specular") > 0.5
         for name, clock, pixel, value, exact in found:
-            # What a step of a normal's component makes of a word, at the exponent of the page.
+            # The effect of a step of a normal's component on a word, at the exponent of the page.
             limit = 1.0 if name in "rgb" else 0.3 if name.startswith("red") else 1e-4
             if name in ("product", "base", "square", "specular"):
                 limit = 1e-3
@@ -175,7 +175,7 @@ def test_step_through_a_span(open_page):
     page.locator("#play").click()
     page.wait_for_function(f"() => blysk.inside.clock > {first + 6}")
     page.locator("#play").click()
-    # Another light is another frame: what was inside is gone.
+    # Another light gives another frame, and the data inside is gone.
     change(page, "ambient", 0.2)
     assert page.locator("#inside").is_hidden()
 
@@ -192,7 +192,7 @@ def test_keyboard(open_page):
     page.keyboard.press("Enter")
     page.wait_for_selector("body[data-inside]")
     assert page.locator("#inside").is_visible()
-    # All that can be done is reached by the Tab key.
+    # The Tab key reaches all controls.
     page.locator("#frame").focus()
     reached = set()
     for _ in range(40):
@@ -218,9 +218,9 @@ def test_opens_with_the_light_turning_unless_asked_not_to(open_page):
 
 
 def test_hardware_beside_hardware(open_page):
-    """Right of the divider the frame of `linear`, simulated too, with its own error.
+    """Right of the divider is the simulated frame of `linear`, with its own error.
 
-    This site has it with another model than that of the first frame.
+    This site has `linear` with another model than that of the first frame.
     """
     page = open_page()
     exact = digest(picture_of(page, "golden"))
@@ -249,7 +249,7 @@ def test_light_goes_round(open_page):
 
 
 def test_page_stays_free_while_the_worker_simulates(open_page):
-    """The browser draws all through one long frame: that of fifty times the spans."""
+    """The browser keeps drawing during one long frame, with fifty times the spans."""
     page = open_page()
     assert len(page.workers) == 1
     _, _, frame = prepared(state_of(page))
@@ -285,7 +285,7 @@ COARSE = """
 
 
 def test_coarse_clock(open_page):
-    """A browser that tells the time in steps of 100 ms, in the worker too."""
+    """A browser that tells the time in steps of 100 ms, also in the worker."""
     in_worker = """
         const Plain = Blob;
         window.Blob = class extends Plain {
@@ -342,7 +342,7 @@ def test_page_fits_its_window(open_page, width, scheme):
         assert box["x"] + box["width"] <= WIDTHS[width][0]
         assert name == "exponent" or box["height"] >= 24
     if width == "desktop":
-        # As it opens, its picture, divider and three controls are in sight.
+        # When the page opens, its picture, divider and three controls are visible.
         page.locator("#close").click()
         page.evaluate("() => scrollTo(0, 0)")
         for name in ("frame", "split", "compare", "method", "exponent"):
@@ -394,7 +394,7 @@ def test_missing_file_is_told(open_page, live_site):
     kept.unlink()
     try:
         page = open_page(waits=True)
-        # The browser says so on its console, too.
+        # The browser prints this on its console, too.
         open_page.allowed = "ERR_FILE_NOT_FOUND"
         page.locator("#method").select_option("renormalise")
         page.locator("#model").select_option("exp")

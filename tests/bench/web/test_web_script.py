@@ -1,4 +1,4 @@
-"""The arithmetic of the live page's script, without a browser: to the bit that of Python."""
+"""The arithmetic of the live page's script, without a browser, equals that of Python to the bit."""
 
 import json
 import shutil
@@ -50,7 +50,7 @@ needs_node = pytest.mark.skipif(shutil.which("node") is None, reason="there is n
 @needs_node
 @pytest.mark.parametrize("model", ["blinn", "phong"])
 def test_vectors_and_constants_of_quotient_are_those_of_python(model, monkeypatch):
-    """To the bit, in the frame of every light: spans of a pixel and long ones, directions of L, tables."""
+    """To the bit, in the frame of every light: short and long spans, directions of L, tables."""
     monkeypatch.setattr(web_data, "MAX_EXPONENT", 30)
     design = web_data.design_of("quotient", model)
     _, spans = web_data.spans_of("square", 3, 100, design)
