@@ -234,7 +234,7 @@ class WidePipelinesUnit(_JoinedPipelines):
 
 
 class MergedPipelinesUnit(_JoinedPipelines):
-    """`PixelPipelinesUnit` with one stream of pixels. They have the order in which one pipeline gives them.
+    """`PixelPipelinesUnit` with one stream of pixels, in the order in which one pipeline gives them.
 
     The unit gives at most a pixel a cycle. So several pipelines gain speed only if each takes several cycles
     for a pixel, as in the compact style.

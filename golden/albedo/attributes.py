@@ -32,7 +32,7 @@ class PixelAttributes(NamedTuple):
 
 @dataclass(frozen=True)
 class Attributes:
-    """``A = U/w`` of every attribute of a pixel, by one reciprocal of w.
+    """Attributes of a pixel: ``A = U/w``, by one reciprocal of w.
 
     w is shifted by k bits into [1/2, 1), and each U by the same k bits. Let x be ``2 w 2^k``, from 1 to 2.
     Then ``A = 2 U 2^k r`` with ``r = 1/x``. A table of 512 entries and one product make r. It comes in two

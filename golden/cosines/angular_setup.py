@@ -24,7 +24,10 @@ SPAN_ANGLES = ("half_chord", "arccos")
 
 @dataclass(frozen=True)
 class AngularSetup:
-    """``psi``, ``lambda``, ``psi/(m-1)`` and ``cos beta`` from ``N_l``, ``N_r`` and a fixed vector H.
+    """Angles ``psi``, ``lambda``, ``psi/(m-1)``, and ``cos beta``, of a span and a fixed vector H.
+
+    psi is the angle between ``N_l`` and ``N_r``, and m is the number of pixels. beta is the angle of H to the
+    plane of the great circle. lambda is the angle from ``N_l`` to the projection of H on this plane.
 
     [T] 3.1 takes psi from arccos. Then ``tan lambda = (N_r.H - cos psi N_l.H)/(sin psi N_l.H)``, which
     becomes 0/0 as psi tends to 0. Most spans are narrow. Here, with ``a = N_l.H``, ``b = N_r.H`` and the

@@ -35,7 +35,7 @@ The published columns are A, B, C; 74.547 is a misprint of 74.457.
 
 @dataclass(frozen=True)
 class Arccos:
-    """``arccos x = c0 + x (c1 + c2 x)`` in radians, in five segments; for x < 0 ``pi - arccos(-x)``.
+    """Arccosine in radians: ``c0 + x (c1 + c2 x)``, in five segments. For x < 0 it is ``pi - arccos(-x)``.
 
     ================ ================== ==========================================================
     word             format             why

@@ -12,7 +12,7 @@ __all__ = ["HighlightCosine"]
 
 @dataclass(frozen=True)
 class HighlightCosine:
-    """``1 - cos gamma`` with ``cos gamma(t) = cos beta cos(lambda - t psi)``, for every pixel.
+    """Operand ``1 - cos gamma`` of every pixel, with ``cos gamma(t) = cos beta cos(lambda - t psi)``.
 
     N(t) moves along a great circle. beta is the angle between the plane of this circle and H. lambda is the
     angle from N_l to the projection of H onto the plane. One signed accumulator counts

@@ -24,7 +24,7 @@ def place_format(parts: int) -> Format:
 
 @dataclass(frozen=True)
 class Quotient:
-    """``N·L = l/sqrt(q)`` and ``s = m/q`` of every pixel; s is a place in a table by octaves.
+    """Operands of a pixel: ``N·L = l/sqrt(q)``, and the place of ``s = m/q`` in a table by octaves.
 
     ``q = m + w`` is shifted by an even number of bits, 2k, into [1, 4). Then ``r = 1/sqrt(q)`` comes from a
     table of 384 entries with one product. N·L is ``l 2^k r``. m is shifted into a word of 17 bits, by

@@ -21,8 +21,11 @@ __all__ = ["RecurrenceSetup"]
 class RecurrenceSetup:
     """Start values of ``x(k) = A cos(lambda - k d)``, ``d = psi/(m-1)``, along a span and a fixed vector H.
 
-    With ``a = N_l.H``, ``b = N_r.H`` and ``q = |N_r - N_l|^2/2 = 1 - cos psi``, the curve is
-    ``x(k) = (a sin(psi - k d) + b sin(k d))/sin psi``, so that
+    lambda is the angle from ``N_l`` to the projection of H on the plane of the great circle. A is the cosine
+    of the angle of H to this plane. m is the number of pixels.
+
+    With ``a = N_l.H``, ``b = N_r.H`` and ``q = |N_r - N_l|^2/2 = 1 - cos psi``, the curve is ``x(k) = (a
+    sin(psi - k d) + b sin(k d))/sin psi``, so that
 
     - ``x(0) = a``,
     - ``x(1) - x(0) = rho (b - a + a q) - a K/2``, ``rho = sin d/sin psi``, ``K = 4 sin^2(d/2)``.

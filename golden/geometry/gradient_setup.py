@@ -185,7 +185,7 @@ class GradientSetup:
         )
 
     def _part(self, fraction: Fixed, inward: Fixed) -> Fixed:
-        """``f g W'``, cut to 40 fraction bits."""
+        """Product ``f g W'``, cut to 40 fraction bits."""
         (f_high, f_low), (g_high, g_low) = (
             halves(fraction, self.FRACTION_LOW),
             halves(inward, self.PRODUCT_LOW),

@@ -14,7 +14,7 @@ __all__ = ["HalfwayVector"]
 
 @dataclass(frozen=True)
 class HalfwayVector:
-    """``H = (L + V) / |L + V|``; 0 where L and V are opposite.
+    """Half-way vector ``H = (L + V) / |L + V|``. It is 0 where L and V are opposite.
 
     The sum is exact, and half of it is normalised by `VectorNormaliser`. So the length of H is off by at most
     `VectorNormaliser.LENGTH_ERROR`. Its direction is off by at most `VectorNormaliser.DIRECTION_ERROR` from

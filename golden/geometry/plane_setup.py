@@ -64,7 +64,7 @@ class PlaneScales:
 
 @dataclass(frozen=True)
 class PlaneSetup:
-    """``1/D`` and ``1/W`` of a triangle, where D is its height and W its largest width, at the middle corner.
+    """Reciprocals ``1/D`` and ``1/W`` of a triangle: D is its height, W its width at the middle corner.
 
     Let a be twice the area, ``D = d 2^e`` and ``a = A 2^g`` in steps of the grid, d and A from 1 to 2. The
     width in pixels is ``a / (D 2^s)``, so ``1/W = (d / A) 2^(s + e - g)``. `Reciprocal` gives ``1/d`` and

@@ -11,7 +11,7 @@ __all__ = ["Reciprocal"]
 
 
 class Reciprocal:
-    """``1/x`` for ``1 <= x < 2``, as ``c0 - u (c1 - u c2)``. u is the distance from the segment's middle.
+    """Reciprocal ``1/x``, ``1 <= x < 2``, as ``c0 - u (c1 - u c2)``. u is 0 in the middle of a segment.
 
     ============ ============ =====================================================================
     word         format       why
@@ -47,7 +47,7 @@ class Reciprocal:
 
     @cached_property
     def coefficients(self) -> tuple[Fixed, Fixed, Fixed]:
-        """``c0, c1, c2`` of every segment, shape (256,) each."""
+        """Coefficients ``c0, c1, c2`` of every segment, shape (256,) each."""
         segments = 1 << self.SEGMENT_BITS
         middle = 1 + (np.arange(segments) + 0.5) / segments
         half = 0.5 / segments

@@ -15,7 +15,7 @@ __all__ = ["VectorNormaliser"]
 
 @dataclass(frozen=True)
 class VectorNormaliser:
-    """``v / |v|`` by a shift, a table of the reciprocal root in 384 linear segments, and products.
+    """Unit vector ``v / |v|``, by a shift, a reciprocal root in 384 linear segments, and products.
 
     The components are shifted left together, by at most 15 places, until a component has no second sign bit.
     Then they are rounded to 18 bits. Their squared length s is then 1/4 to 3. With ``s' = s``, or
@@ -67,7 +67,7 @@ class VectorNormaliser:
 
     @cached_property
     def coefficients(self) -> tuple[Fixed, Fixed]:
-        """``c0, c1`` of the segments from 1/4 to 1, shape (512,) each. The first 128 are 0 and not used."""
+        """Coefficients of the segments from 1/4 to 1, shape (512,) each. The first 128 are 0 and not used."""
         segments = 1 << self.SEGMENT_BITS
         middle = (np.arange(segments // 4, segments) + 0.5) / segments
         u = np.linspace(-0.5, 0.5, 65)[:, np.newaxis] / segments

@@ -26,7 +26,7 @@ def halves(value: Fixed, low_bits: int) -> tuple[Fixed, Fixed]:
 
 
 def wide_product(a: Fixed, b: Fixed, a_low: int, b_low: int, fraction_bits: int) -> Fixed:
-    """``a b`` from three products of the halves. The product of the two low halves is omitted.
+    """Product ``a b`` from three products of the halves. The product of the two low halves is omitted.
 
     Each product is cut to `GUARD_BITS` more fraction bits than the result has. Their sum is rounded half up.
 

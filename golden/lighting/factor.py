@@ -9,7 +9,7 @@ __all__ = ["Factor"]
 
 @dataclass(frozen=True)
 class Factor:
-    """``a S``: specular term S times the factor a of distance and spot, cut to 17 fraction bits.
+    """Product ``a S`` of a specular term S and a factor a of distance and spot, cut to 17 fraction bits.
 
     The diffuse term needs no product here: N·L of a light that fades already contains a.
 

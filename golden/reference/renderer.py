@@ -59,7 +59,7 @@ _CHUNK = 1 << 15
 
 @dataclass(frozen=True)
 class ExactFrame:
-    """A picture.
+    """A picture in float64.
 
     Parameters
     ----------

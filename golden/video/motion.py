@@ -31,7 +31,7 @@ def rotation(axis: Sequence[float], angle: float) -> np.ndarray:
 
 
 def _turns(axis: Sequence[float]) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """``a a^T``, ``1 - a a^T`` and the matrix of the cross product with a, the unit axis."""
+    """Matrices of an axis, a of length 1: ``a a^T``, ``1 - a a^T``, and the cross product with a."""
     x, y, z = a = normalise(axis)
     along = np.outer(a, a)
     return along, np.eye(3) - along, np.array([[0, -z, y], [z, 0, -x], [-y, x, 0]])

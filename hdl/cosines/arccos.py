@@ -14,7 +14,7 @@ __all__ = ["ArccosUnit"]
 
 
 class ArccosUnit(PipelinedUnit):
-    """``arccos x = c0 + x (c1 + c2 x)`` in five segments. For x below 0 it is ``pi - arccos(-x)``.
+    """Arccosine in radians: ``c0 + x (c1 + c2 x)``, in five segments. For x < 0 it is ``pi - arccos(-x)``.
 
     `Arccos`, the bit-accurate model of both forms, has tables, formats and error bounds.
 

@@ -30,9 +30,10 @@ def highlight_shape() -> data.StructLayout:
 
 
 class HighlightCosineUnit(wiring.Component):
-    """``1 - cos gamma`` with ``cos gamma(t) = cos beta cos(lambda - t psi)``, one pixel a cycle.
+    """Operand ``1 - cos gamma`` of a pixel a cycle, with ``cos gamma(t) = cos beta cos(lambda - t psi)``.
 
-    `HighlightCosine`, the bit-accurate model, has table, formats and error bounds.
+    `HighlightCosine`, the bit-accurate model, defines beta and lambda. It has table, formats and error
+    bounds.
 
     The first value of a span comes 12 cycles after the span is accepted. The stages are accumulator, folding,
     table and its register, rise, sum, operand, product, alignment, rounding, sum, saturation. The values of

@@ -55,7 +55,7 @@ def quotients_shape(model: Quotient) -> data.StructLayout:
 
 
 class QuotientUnit(PipelinedUnit):
-    """``N·L = l/sqrt(q)`` and the place of ``s = m/q`` in a lobe's table, for every light.
+    """Operands of every light: ``N·L = l/sqrt(q)``, and the place of ``s = m/q`` in a lobe's table.
 
     `Quotient`, the bit-accurate model, has formats, table and error bounds.
 

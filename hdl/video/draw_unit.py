@@ -210,7 +210,7 @@ class DrawUnit(wiring.Component):
         self._count(m, frames=begins & first, bands=begins, busy=~waits | self.depth.busy)
 
     def _command(self, m: Module, idle: Signal) -> None:
-        """States of the commands."""
+        """States that execute the commands."""
         command = self._command_in
         kind, take, valid = command.payload.kind, command.ready, command.valid
         left = Signal(12, name="vertices_left")
