@@ -53,7 +53,7 @@ class ShadingPipeline:
         Whether there is one channel in place of three. It uses the colour operands of red, and the pixel
         repeats it three times.
     x_bits, y_bits, length_bits : int
-        Bits of the coordinates, 1 to 12, and of a span's length, 2 to 12.
+        Bits of the coordinates (1 to 12), and of a span's length (2 to 12).
     factors : tuple of int
         Indices, in ascending order, of the lights that fade by their distance or as a spot. A factor
         multiplies the specular term of its light. The method must take values, and there must be specular

@@ -166,8 +166,9 @@ def preset(
     method : str, optional
         One of `METHODS` or `PUBLISHED`; by default `default_method`.
     model : str or ReflectionModel or None
-        One of `MODELS`, `LOBES` or, for the method ``quotient``, `MIRROR_LOBES`. Or a reflection model of
-        N·H, such as a `TabulatedModel`; the design then has a table. ``None``: no specular light.
+        One of `MODELS` or `LOBES`, and for the method ``quotient`` also one of `MIRROR_LOBES`. Or a
+        reflection model of N·H, such as a `TabulatedModel`; the design then has a table. ``None``: no
+        specular light.
     lights : int
         Number of lights, 0 to 16.
     operand : {"cosine", "one_minus_cosine"}, optional

@@ -72,15 +72,18 @@ class Renderer:
         The shading pipeline, of a method that takes normals or vectors. If its `Build` has a coarse depth
         test, the test drops a span before shading if all of its pixels are hidden. The picture is the same.
     geometry : Geometry
-        The part that makes spans of triangles. It has ``lines`` for a method that takes true lines, and
-        ``vectors`` for a method that takes vectors; with several lights ``rotates``, too. By default the
+        The part that makes spans of triangles. It has ``lines`` for a method that takes true lines. It has
+        ``vectors`` for a method that takes vectors, and with several lights ``rotates``, too. By default the
         geometry suits the method.
 
     Raises
     ------
     ValueError
-        If the method takes values, or other words than the geometry gives. If the design has an albedo, and
-        the method takes no vectors, the albedo has no 1/W, or its texels are outside.
+        In one of these cases:
+
+        - the method takes values, or other words than the geometry gives;
+        - the design has an albedo, and the method takes no vectors;
+        - the albedo has no 1/W, or its texels are outside.
 
     Source: docs/theory/geometry.md#composition; [T] figure 4.10.
     """

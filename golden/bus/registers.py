@@ -74,8 +74,8 @@ class Register:
     address : int
         Address of its first byte, a multiple of 4.
     access : str
-        ``"read-only"``, ``"read-write"`` (reset to 0), ``"write-only"``, or ``"clear"``: a written 1 clears
-        its bit, and a 1 for a missing bit does nothing.
+        One of ``"read-only"``, ``"read-write"`` (reset to 0), ``"write-only"`` and ``"clear"``. With
+        ``"clear"`` a written 1 clears its bit, and a written 1 for a missing bit does nothing.
     width : int
         Bits of its value.
     signed : bool

@@ -19,7 +19,8 @@ class SpanValues(NamedTuple):
     Parameters
     ----------
     diffuse, highlight : int64 arrays, shape (spans, lights, 3)
-        Codes of N·L, ``SQ(1, 25)``, and of ``u = |N - H|^2 / 2``, ``UQ(1, 26)``, in units of `ONE_SQUARED`.
+        Codes of N·L in ``SQ(1, 25)``, and of ``u = |N - H|^2 / 2`` in ``UQ(1, 26)``. `ONE_SQUARED` is their
+        unit.
     """
 
     diffuse: np.ndarray
@@ -32,7 +33,7 @@ class SpanValues(NamedTuple):
         Parameters
         ----------
         diffuse, highlight : float64 arrays, shape (spans, lights, 3)
-            N·L, -1 to 1, and u, 0 to 2.
+            N·L from -1 to 1, and u from 0 to 2.
         scale : int
             s. If it is over 0, the words of u are ``min(2^s u, 1)``, see `LocalChordInterpolator`.
 

@@ -73,8 +73,8 @@ class Comparison:
     Parameters
     ----------
     golden : float64 array, shape (height, width, 3)
-        The exact frame with the frame's model, in [0, 1], encoded by the transfer: per-pixel normals,
-        perspective-correct and normalised, of the rasterised triangles.
+        The exact frame with the frame's model, in [0, 1], encoded by the transfer. Every pixel has a
+        perspective-correct, normalised normal of the rasterised triangles.
     arithmetic_error : FrameErrors
         Against the same method and model in float64; NaN if the spans are unknown.
     method_error : FrameErrors

@@ -130,7 +130,7 @@ def encoded_bound(bound: ArrayLike, least: ArrayLike, transfer: str) -> float:
     bound : float, or float64 array
         Bound of `error_bound`, or bounds of pixels. At least a pixel is needed.
     least : float, or float64 array of the same shape
-        The least exact channel of the frame, or the exact channels of pixels, in [0, 1], linear light.
+        The least exact channel of the frame, or the exact channels of pixels: linear light in [0, 1].
     transfer : str
         One of `TRANSFERS`.
 

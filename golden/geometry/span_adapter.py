@@ -104,8 +104,8 @@ def shading_spans(spans: TrueSpans | LineSpans | VectorSpans) -> Spans:
     Parameters
     ----------
     spans : TrueSpans, LineSpans or VectorSpans
-        From `EdgeNormals`, with left and right unit normals, from `LineAdapter`, or from `VectorAdapter`,
-        with normals of 0.
+        From `EdgeNormals` (with unit normals at both ends), from `LineAdapter`, or from `VectorAdapter` (all
+        normals are then 0).
     """
     if isinstance(spans, VectorSpans):
         none = np.zeros_like(spans.start[:, :3])

@@ -18,9 +18,9 @@ class VectorNormaliser:
     """Unit vector ``v / |v|``, by a shift, a reciprocal root in 384 linear segments, and products.
 
     The components are shifted left together, by at most 15 places, until a component has no second sign bit.
-    Then they are rounded to 18 bits. Their squared length s is then 1/4 to 3. With ``s' = s``, or
-    ``s' = s / 4`` if s is 1 or more, the table gives ``f = (ONE/2^17) / sqrt(s')``, and the result is
-    ``v + e v`` with ``e = f - 1``, or ``e = f/2 - 1``.
+    Then they are rounded to 18 bits. Their squared length s is then 1/4 to 3. Let ``s' = s``, or ``s' = s /
+    4`` if s is 1 or more. The table gives ``f = (ONE/2^17) / sqrt(s')``. The result is ``v + e v`` with ``e =
+    f - 1``, or with ``e = f/2 - 1`` if s is 1 or more.
 
     ============ ============ =====================================================================
     word         format       why

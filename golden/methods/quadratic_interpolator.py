@@ -23,7 +23,7 @@ __all__ = ["METHODS", "PUBLISHED", "QuadraticInterpolator"]
 class QuadraticInterpolator(NormalInterpolator):
     """Normals on a quadratic through the exactly normalised middle normal, for spans to 45 degrees.
 
-    The units are the middle normal, G/P/Q, and, by ``form``,
+    The units are the middle normal, G/P/Q, and units that ``form`` chooses:
 
     - forward differences: setup and accumulator, figures 2.11 and 2.10;
     - ``direct``: the evaluator of figure 2.9 a;

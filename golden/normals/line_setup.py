@@ -42,8 +42,8 @@ class LineSetup:
     ========== ============ ============================================================
 
     The error of a point of the line at any pixel is at most `ERROR`, for P up to 2 in a component. It is the
-    sum of ``2^-24 |P|`` by the reciprocal, 2^-31 by the product that is left out, and the drift,
-    ``4094 2^-41``.
+    sum of ``2^-24 |P|`` by the reciprocal, 2^-31 by the product that is left out, and ``4094 2^-41`` by the
+    drift.
 
     Source: docs/theory/interpolation.md#renormaliser.
     """

@@ -39,8 +39,8 @@ class Renormaliser:
     ============ ========== =================================================================
 
     A vector with all components from -`SHORTEST` to under `SHORTEST` is flagged. Its N is invalid. For other
-    vectors the error of direction is at most `DIRECTION_ERROR` radians, without the rounding of v. The
-    rounding of w, of length 1/2 or more, adds ``sqrt(3) 2^-18``, and the rounding of N as much. The length
+    vectors the error of direction is at most `DIRECTION_ERROR` radians, without the rounding of v. w has a
+    length of 1/2 or more. Its rounding adds ``sqrt(3) 2^-18``, and the rounding of N adds as much. The length
     error is at most `LENGTH_ERROR`: the error of r times |w|, up to sqrt(3), plus the rounding of N.
 
     Source: docs/theory/interpolation.md#renormaliser.

@@ -57,7 +57,7 @@ def triangle_levels(
     source : int array, shape (T,)
         Face of each triangle, or of each piece of a clipped triangle.
     corners : float64 array, shape (T, 3, 3)
-        Homogeneous coordinates of the corners: x and y times w in pixels, and w, over 0.
+        Homogeneous coordinates of the corners: ``x w`` and ``y w`` in pixels, and w, which is over 0.
     coordinates : float64 array, shape (T, 3, 2)
         Texture coordinates of the corners.
 

@@ -19,8 +19,8 @@ class TriangleAssembly:
     """Chooses triangles that have no corner outside, and may cover the centre of a scanline of the band.
 
     A triangle is *rejected* if no scanline from ``top`` to ``bottom - 1`` has its centre between the highest
-    corner, included, and the lowest, excluded. These are exactly the triangles that `VertexSort` would find
-    empty by y.
+    corner (included) and the lowest corner (excluded). These are exactly the triangles that `VertexSort`
+    would find empty by y.
 
     Parameters
     ----------
@@ -56,7 +56,7 @@ class TriangleAssembly:
         vertices : ScreenVertices
             All vertices of the memory.
         first, count, material : int64 arrays, shape (R,)
-            First triangle, number of triangles, 1 or more, and material of each range.
+            For each range the first triangle, the number of triangles (1 or more), and the material.
         top, bottom : int
             First scanline of the band, and first scanline after it.
         """

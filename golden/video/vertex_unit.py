@@ -56,8 +56,8 @@ class ScreenVertices:
     normal : int64 array, shape (V, 3)
         N/W, codes of `ATTRIBUTE`.
     outside : bool array, shape (V,)
-        Whether the vertex is nearer than the near plane, at `VertexTransform.FAR` near planes or farther, or
-        beside the grid. Its other words are then invalid.
+        Whether the vertex is nearer than the near plane, beside the grid, or at least `VertexTransform.FAR`
+        times as far as the near plane. Its other words are then invalid.
     """
 
     x: np.ndarray

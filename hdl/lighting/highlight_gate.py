@@ -63,8 +63,8 @@ class HighlightGateUnit(PipelinedUnit):
     o : :py:`Out(stream.Signature(unsigned(lights)))`
         Whether the span may be lit, a bit for each light. Bit 0 is the first light.
     constants : :py:`In(StructLayout({"halfway": ArrayLayout(..., lights), "exponent": 10}))`
-        Unit vectors H. If it is a port, also the exponent, 1 to 1000, or ``threshold``, T in F bits. All are
-        constant while beats are inside.
+        Unit vectors H. Also the exponent (1 to 1000), or ``threshold`` (T in F bits), unless the exponent is
+        fixed. All are constant while beats are inside.
 
     Source: docs/theory/units.md#highlight-gate; [T] 4.2 and figure 4.10.
     """

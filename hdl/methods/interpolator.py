@@ -46,7 +46,7 @@ def flag_spans(m: Module, accepted: Value, pixel: data.View) -> Signal:
     accepted : Value
         Whether a pixel leaves on this cycle.
     pixel : data.View
-        The pixel, with ``out_of_range``, and ``span``, a bit that alternates from span to span.
+        The pixel, with ``out_of_range`` and ``span``. ``span`` is a bit that alternates from span to span.
 
     Returns
     -------
