@@ -83,6 +83,7 @@ class Renderer:
 
         - the method takes values, or other words than the geometry gives;
         - the design has an albedo, and the method takes no vectors;
+        - the design has an albedo, and several lanes of triangle setup;
         - the albedo has no 1/W, or its texels are outside.
 
     Source: docs/theory/geometry.md#composition; [T] figure 4.10.

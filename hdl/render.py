@@ -309,8 +309,8 @@ class RendererUnit(wiring.Component):
             return Const(1), Const(0)
         m.submodules.coarse = coarse = self.coarse
         place = coarse.i.payload
-        # ``number`` changes with the first span of each picture. ``picture`` itself does not serve: after a
-        # picture without spans it may have the same value as at the last span.
+        # ``number`` changes with the first span of each picture. ``picture`` itself does not serve. After a
+        # picture without spans it may have the value that it had at the last span.
         number, before, turned = (Signal(name=name) for name in ("number", "picture_before", "turned"))
         turns = turned | (self.constants.picture != before)
         m.d.sync += [before.eq(self.constants.picture), turned.eq(turns)]

@@ -64,7 +64,7 @@ def quantise(vectors: np.ndarray) -> np.ndarray:
         raise ValueError("vectors must have unit length")
     scaled = vectors * ONE
     low = np.floor(scaled).astype(np.int64)
-    # Both neighbours of a component that is a whole code are that code.
+    # If a component is a whole code, both of its neighbours are this code.
     high = np.ceil(scaled).astype(np.int64)
     squares = [np.moveaxis(codes * codes, -1, 0) for codes in (low, high)]
     smallest = np.full(low.shape[:-1], np.iinfo(np.int64).max)

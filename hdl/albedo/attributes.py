@@ -150,7 +150,7 @@ class AttributesUnit(PipelinedUnit):
             def shifted(numerator, shift):
                 return FixedValue(SQ(2, 23), (Value.cast(numerator) << shift)[:25])
 
-            # It is made as late as the reciprocal needs it, because a word that waits is copied.
+            # The shifted word is made as late as the reciprocal allows, because a word that waits is copied.
             moved = g.register(f"{name}_shifted", shifted, numerator, shift, since=bend, formula="U' = 2^k·U")
             if name.startswith("colors"):
                 moved = operand = g.register(f"{name}_inside", lambda u: u.saturate(UQ(0, 23)), moved)

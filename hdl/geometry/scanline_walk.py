@@ -35,8 +35,8 @@ class AttributeTurns:
             Signal(name="ends"),
             Signal(name="steps"),
         )
-        # ``accepts``: a scanline comes in, on a step of each attribute; ``goes``: the control moves on;
-        # ``takes``: it takes a scanline; ``loads``: it takes a scanline with pixels.
+        # ``accepts``: a scanline comes in, on a step of each attribute. ``goes``: the control moves on.
+        # ``takes``: the control takes a scanline. ``loads``: the control takes a scanline with pixels.
         self.accepts, self.goes, self.takes = (Signal(name=name) for name in ("accepts", "goes", "takes"))
         self.loads, covered = Signal(name="loads_walk"), rows.payload.row.covered
         opens = ~busy | self.leaves

@@ -305,8 +305,8 @@ class SerialVectorsUnit(wiring.Component):
 
         m.d.sync += [copy(after, before) for before, after in pairwise(notes)]
 
-        # Both words have the fraction bits of the step: the first pixel's value, under 1, and the step modulo
-        # 2.
+        # Two words have the fraction bits of the step: the first pixel's value, which is under 1, and the
+        # step modulo 2.
         value, step = Mux(right, heads["far"], heads["near"]), heads["step"]
         beyond, sign = value[-1] ^ value[-2], value[-1]
         value = Cat(Mux(beyond, (~sign).replicate(bits - 1), value[: bits - 1]), sign)

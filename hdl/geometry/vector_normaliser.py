@@ -125,7 +125,7 @@ class VectorNormaliserUnit(PipelinedUnit):
         rest = register(m, s[:bits], "rest")
         large = self._delay(m, large, "large", 6)
         c0, c1 = self._coefficients(m, segment)
-        # u counts half steps. It is always odd, because half a step stands for the bits that were cut.
+        # u counts half steps. u is always odd, because half a step stands for the dropped bits.
         u = self._delay(m, _offset(rest), "u", 2)
         # c1 is unsigned: a zero above it completes its last Booth digit.
         digits = Cat(Const(0, 1), Value.cast(c1), Const(0, 2))
@@ -247,7 +247,7 @@ class SharedVectorNormaliserUnit(PipelinedUnit):
             return found[0] | found[1] | found[2]
 
         def moved(word, step):
-            # Shift by zero to three steps. Both bits of this number follow from the unshifted word.
+            # Shift by zero to three steps. Both bits of the number of steps follow from the unshifted word.
             empties = [~word[bits - (k + 1) * step : bits - k * step].any() for k in range(3)]
             two = empties[0] & empties[1]
             one = Mux(two, empties[2], empties[0])

@@ -272,8 +272,8 @@ class LightUnit(wiring.Component):
     ) -> None:
         """Diffuse terms wait for the specular terms of their beats. A dark beat has no specular term."""
         depth = self._depth
-        # A bit of each beat tells whether it is dark. It waits as long as the beat's term is in the diffuse
-        # unit or its FIFO.
+        # A bit tells whether a beat is dark. The bit waits as long as the beat's term is in the diffuse unit
+        # or in its FIFO.
         m.submodules.skips = skips = fifo.SyncFIFOBuffered(width=1, depth=depth + diffuse.latency)
         terms = diffuse.o.signature.create(path=("terms",))
         connect_fifo(m, "waiting", diffuse.o, terms, depth)

@@ -97,7 +97,7 @@ class SlopeUnit(wiring.Component):
             read, boundary = (
                 Signal(p.SHIFTED_FORMAT.width, name=name, reset_less=True) for name in ("read", "boundary")
             )
-            # The first register is inside an FPGA's memory. It is far from the logic that the second register
+            # The first register is inside an FPGA's memory, far from the logic that the second register
             # drives.
             m.d.sync += [read.eq(word), boundary.eq(read)]
         m.d.comb += [

@@ -72,7 +72,8 @@ class QuadraticInterpolatorUnit(NormalInterpolatorUnit, model=QuadraticInterpola
         """Coefficients, and the normals of the form."""
         m.submodules.middle_normal = middle = self._middle
         m.submodules.gpq = gpq = self._gpq
-        # The FIFO is never full. Its depth is the most spans inside both units, with one more at each output.
+        # The FIFO is never full. Its depth is the largest number of spans inside both units, plus one at each
+        # output.
         depth = -(-middle.latency // middle.initiation_interval) + gpq.latency + 2
         m.submodules.lengths = lengths = fifo.SyncFIFOBuffered(width=self.length_bits, depth=depth)
         length = stream.Signature(self.length_bits).create(path=("length",))
