@@ -21,7 +21,7 @@ class Decided:
     Parameters
     ----------
     digests : iterable of str
-        Those that are known.
+        The known digests.
 
     Attributes
     ----------

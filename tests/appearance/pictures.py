@@ -43,9 +43,9 @@ def drawn(source, scene, sampler=None, shifts=((0, 0),), lit=False, cutoff=0.0):
     scene : Scene
         The camera, the size and the background. If ``lit``, also the light and the coefficients.
     sampler : dict
-        Of glTF: VTK's importer does not keep all of it.
+        Sampler of the glTF file. VTK's importer does not keep all of it.
     shifts : sequence of two floats
-        One picture for each: by how many pixels the camera moves to the right and up.
+        Pixels by which the camera moves to the right and up. Each shift gives a picture.
     lit : bool
         Whether to draw with light, by Phong's model. If not, each surface has its own colour.
     cutoff : float

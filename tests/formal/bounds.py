@@ -42,7 +42,7 @@ class Bounds:
     parts : dict of Unknown to array, optional
         Factors of the sum.
     rest : tuple of arrays, optional
-        Of the sum; ``None``: there is none but the interval itself.
+        The rest of the sum. ``None``: the interval itself.
     """
 
     def __init__(self, low, high, parts=None, rest=None):

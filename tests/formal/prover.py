@@ -60,9 +60,9 @@ class Harness:
     Parameters
     ----------
     unit : Component
-        Unit; it is elaborated at once, so that claims may name what its `elaborate` keeps.
+        Unit. It is elaborated at once, so that claims may name signals that its `elaborate` keeps.
     multiplies : bool
-        Multipliers are true ones; for operands of few bits.
+        Keep the true multipliers. This is for operands of few bits.
 
     Attributes
     ----------
@@ -132,11 +132,12 @@ class Verdict:
     Parameters
     ----------
     holds : bool or None
-        Whether they hold, on every cycle or on so many as asked for; ``None``: not decided in time.
+        Whether the claims hold, in every cycle or in as many cycles as asked for. ``None``: this was not
+        decided in time.
     cycles : int
-        Clocks after the first of the counterexample's last, or the frames that the search has seen.
+        Number of the last cycle of the counterexample, from 0, or the frames that the search has seen.
     trace : str
-        The counterexample: a line a clock, the bits of the inputs that are 1; empty if there is none.
+        The counterexample. Each line has the input bits that are 1 in a cycle. Empty if there is none.
     """
 
     holds: bool | None
@@ -194,12 +195,12 @@ def decide(netlist: str, folder: Path, cycles: int | None = None, multiplies: bo
     netlist : str
         RTLIL text of a harness.
     folder : path
-        For the netlist.
+        Folder for the netlist.
     cycles : int or None
-        Look for a counterexample of at most so many cycles from power-up, by bounded model checking.
-        ``None``: prove the claims for runs of any length, by property-directed reachability (IC3), which
-        finds an inductive invariant and verifies it. Registers that are always equal, as of two chains in
-        step, are made one before: it would have to find that bit by bit.
+        Look for a counterexample of at most this many cycles from power-up, by bounded model checking.
+        ``None``: prove the claims for runs of any length, by property-directed reachability (IC3). IC3 finds
+        an inductive invariant and verifies it. Registers that are always equal, for example in two equal
+        chains, are merged before. Otherwise IC3 would have to find that they are equal bit by bit.
     multiplies : bool
         See `Harness`.
 

@@ -64,18 +64,19 @@ def follows(
     Parameters
     ----------
     harness : Harness
-        Of the unit.
+        Harness of the unit.
     source, sink : stream.Interface
-        Where beats come and leave, a cycle later at the earliest.
+        Streams on which beats come and leave. A beat leaves at least one cycle after it came.
     capacity : int
-        Beats inside at most.
+        Largest number of beats inside.
     image : callable
-        Whether a payload that leaves is the image of one that came. ``None``: they are only counted.
+        Takes a payload that came and a payload that leaves, and tells whether the second is the image of the
+        first. ``None``: beats are only counted.
 
     Returns
     -------
     Signal
-        How many are inside.
+        Number of beats inside.
     """
     m = harness.m
     inside = Signal(range(capacity + 2), name="inside")
@@ -116,17 +117,17 @@ def pixels_follow(
     harness, source, sink
         As for `follows`.
     length : Value
-        Pixels of the span that is offered.
+        Number of pixels of the offered span.
     capacity : int
-        Pixels inside at most.
+        Largest number of pixels inside.
     image : callable
-        Of a span's payload, a pixel's place in it from 0, whether it is the last, and its payload: whether
-        that is right. ``None``: they are only counted.
+        Takes a span's payload, a pixel's place in the span from 0, whether it is the last pixel, and the
+        pixel's payload. It tells whether the pixel's payload is right. ``None``: pixels are only counted.
 
     Returns
     -------
     Signal
-        How many pixels are still to leave.
+        Number of pixels that have not left yet.
     """
     m = harness.m
     owed = Signal(range(capacity + (1 << len(length)) + 1), name="owed")

@@ -25,11 +25,11 @@ def short(
     unit : type
         The unit's class.
     hand_on : callable
-        Of operands and result: assignments to some bits of the result; the others are 0.
+        Takes operands and result, and gives assignments to some bits of the result. The other bits are 0.
     latency : int
-        Clocks from input to output, at least 2 where the interval is over 1.
+        Cycles from input to output; at least 2 if the initiation interval is over 1.
     initiation_interval : int or None
-        ``None``: the unit's.
+        Initiation interval. ``None``: that of the unit.
     """
 
     class Short(unit):
@@ -56,7 +56,7 @@ def short_wave(hand_on: Callable[[Value, Value], Value]) -> Callable:
     Parameters
     ----------
     hand_on : callable
-        Of theta and cos beta: the code of the result.
+        Takes theta and cos beta, and gives the code of the result.
     """
 
     def wave(unit, m, theta, cos_beta):

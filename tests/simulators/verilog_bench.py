@@ -200,11 +200,11 @@ class VerilogBench:
     folder : Path
         Empty folder for the files. Verilator's runtime goes into its parent, where other benches find it.
     text : str, optional
-        Verilog of the module ``core``; by default the component's, as `emit` writes it.
+        Verilog of the module ``core``. The default is the component's Verilog, as `emit` writes it.
     optimise : bool
-        Whether Verilator's model is to be fast rather than soon compiled.
+        Whether Verilator's model is to run fast. If not, it is compiled fast.
     clean : bool
-        Whether Icarus is to have no warning of the text.
+        Whether a warning of Icarus about the text is an error.
     """
 
     def __init__(
@@ -289,9 +289,10 @@ def without_initial_values(text: str, keep: tuple[int, ...] = ()) -> str:
     Parameters
     ----------
     text : str
-        As `emit` writes it.
+        Verilog as `emit` writes it.
     keep : tuple of int
-        Sizes, in words, of written memories that keep theirs: somebody else clears them.
+        Sizes, in words, of written memories that keep their initial values, because something else clears
+        these memories.
     """
 
     def strip(module: re.Match) -> str:

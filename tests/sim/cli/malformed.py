@@ -21,12 +21,12 @@ class Case:
     name : str
         What is wrong.
     arguments : list of str
-        Of `main`.
+        Arguments of `main`.
     files : dict
-        Bytes by name; ``None`` makes a folder, a text a link to it, `os.mkfifo` a pipe. A name that starts
-        with ``../`` lies outside of the working folder.
+        Content by name: bytes for a file, ``None`` for a folder, a text for a link to this name, `os.mkfifo`
+        for a pipe. A file whose name starts with ``../`` is outside of the working folder.
     must_fail : bool
-        Whether it must be refused; else it may be valid by chance.
+        Whether the case must be refused. A case that need not be refused may be valid by chance.
     """
 
     name: str
