@@ -238,7 +238,8 @@ def _gltf_material(
 def _color(look: dict, key: str, count: int, name: str) -> Triple:
     """A colour of a material, perhaps followed by alpha."""
     given = look.get(key, [1] * count)
-    return color_of(given[:3] if _are_numbers(given, count) else [], key, name, str(given))
+    channels = given[:3] if _are_numbers(given, count) else []
+    return color_of(channels, key, name, str(given), "three" if count == 3 else "four")
 
 
 def _are_numbers(given: Any, count: int) -> bool:

@@ -148,11 +148,14 @@ class Found:
         return tuple(counts)
 
 
-def color_of(channels: list[float], what: str, name: str, text: str) -> Triple:
-    """A colour of a material; `Refused`, with the file's text, if it is not three numbers from 0 to 1."""
+def color_of(channels: list[float], what: str, name: str, text: str, many: str = "three") -> Triple:
+    """A colour of a material; `Refused`, with the file's text, if it is not three numbers from 0 to 1.
+
+    The message says how ``many`` numbers the format demands: four, if it has alpha.
+    """
     if len(channels) != 3 or not all(0 <= channel <= 1 for channel in channels):
         raise Refused(
-            f"material {name!r} has {what} {shown(text)!r}, not three numbers from 0 to 1", ONE_MATERIAL
+            f"material {name!r} has {what} {shown(text)!r}, not {many} numbers from 0 to 1", ONE_MATERIAL
         )
     return tuple(map(float, channels))
 

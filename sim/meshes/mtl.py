@@ -93,7 +93,9 @@ def find_obj_materials(libraries: list[str], folder: Path, found: Found) -> dict
             refers(folder, rest.strip(), rest.split()[-1])
         for block in re.split(r"^[ \t]*newmtl(?!\S)", library, flags=re.MULTILINE)[1:]:
             first, _, text = block.partition("\n")
-            blocks.setdefault(first.strip(), (text, target.parent))
+            known, _ = blocks.setdefault(first.strip(), (text, target.parent))
+            if known.split() != text.split():
+                found.tell("second definition of a material", "second definitions of materials")
             commented.setdefault(first.partition(" #")[0].strip(), (text, target.parent))
     images: dict[int, ObjImage] = {}
     textures: dict[tuple[Path, str], Texture] = {}

@@ -261,7 +261,7 @@ def test_emission(tmp_path, material, emission, told):
         ),
         (
             {"extensions": {GLOSSY: {"diffuseFactor": [1, 1, 1]}}},
-            "diffuseFactor '[1, 1, 1]', not three numbers",
+            "diffuseFactor '[1, 1, 1]', not four numbers from 0 to 1",
         ),
         ({"pbrMetallicRoughness": 5}, "has pbrMetallicRoughness '5', not an object"),
     ],

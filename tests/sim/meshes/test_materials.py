@@ -56,6 +56,8 @@ illum 2
 newmtl none
 newmtl red
 Kd 0 0 1
+newmtl none
+
 newmtl matt
 Ns 0
 """
@@ -73,7 +75,11 @@ def test_obj_materials(tmp_path):
     # Faces without a material, with an empty material, and with a missing material are all alike.
     nothing, matt = FileMaterial("none"), FileMaterial("matt", exponent=1)
     assert by_position(loaded) == [nothing, red, grey, nothing, red, nothing, matt]
-    told = ("1 material name without a definition", "of materials: ambient colour (Ka), kd")
+    told = (
+        "1 second definition of a material",
+        "1 material name without a definition",
+        "of materials: ambient colour (Ka), kd",
+    )
     assert loaded.ignored == told
     one = load_mesh(str(tmp_path / "a.obj"), materials=False)
     assert (one.materials, one.ignored) == ((FileMaterial(),), ())
@@ -324,7 +330,7 @@ def test_odd_material_files(tmp_path, monkeypatch):
     check_refused(path, "its material file 'c.mtl' is over 10 bytes")
 
 
-RANGE = "not three numbers from 0 to 1"
+RANGE = "not four numbers from 0 to 1"
 
 
 @pytest.mark.parametrize(
