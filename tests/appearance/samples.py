@@ -269,6 +269,30 @@ def colors_times_texture():
     return file, LINEAR
 
 
+def single_texel():
+    """An image of a texel, and a sampler without filters."""
+    file = File()
+    file.square(file.material([[[200, 90, 30]]], {"wrapS": CLAMP}))
+    return file, {"wrapS": CLAMP}
+
+
+def parts():
+    """Four parts: with a factor, with a texture, with colours, and with colours and a texture.
+
+    In VTK colours of vertices replace a factor. So no part has both.
+    """
+    file = File()
+    textured, white = file.material(noise(), NEAREST), file.material()
+    plain = file.material(baseColorFactor=[0.4, 0.8, 0.6, 1])
+    colors = file.array([[1, 0.2, 0.2], [0.2, 1, 0.2], [0.2, 0.2, 1], [1, 1, 1]])
+    for number, material in enumerate((plain, textured, white, textured)):
+        attributes = {"POSITION": file.array(SQUARE), "TEXCOORD_0": file.array(PLACES)}
+        attributes |= {"COLOR_0": colors} if number > 1 else {}
+        place = [0.4 * (-1) ** number, 0.4 * (-1) ** (number // 2), 0]
+        file.part(material, attributes, [0, 1, 2, 0, 2, 3], scale=[0.5] * 3, translation=place)
+    return file, NEAREST
+
+
 def unlit():
     """Orange and blue boxes without light, turned by nested nodes: UnlitTest, OrientationTest."""
     file = File()
@@ -514,6 +538,8 @@ SAMPLES = {
     "second set of coordinates": (second_set, ()),
     "factor times texture": (factor_times_texture, ()),
     "colours times texture": (colors_times_texture, ()),
+    "single texel": (single_texel, ()),
+    "parts": (parts, ()),
     "unlit": (unlit, ()),
     "grey ramp": (grey_ramp, ()),
     "strip and fan": (primitive_modes, ()),

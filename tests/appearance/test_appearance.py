@@ -82,7 +82,10 @@ def test_codes_of_greys_come_out_as_they_are():
 @pytest.mark.long
 @pytest.mark.parametrize(
     "name",
-    ["vertex colours, f4 x 3", "texture settings, 4", "texture transform", "factor times texture", "metal"],
+    [
+        *("vertex colours, f4 x 3", "texture settings, 4", "texture transform", "factor times texture"),
+        *("metal", "parts", "holes, bilinear", "holes in perspective", "OBJ, image"),
+    ],
 )
 def test_the_pipeline_draws_the_same_picture(name):
     """The bit-accurate model is within 1 LSB of the exact frame, and so it is near VTK's picture."""
