@@ -25,6 +25,7 @@ from blysk.golden.reference.scene import Scene
 from blysk.golden.reference.texture import FILTERS, Texture
 from blysk.golden.reference.transfer import SPACES
 from blysk.hdl.emit.cost import cost_of
+from blysk.sim.frames.frame import FrameSimulator
 from blysk.sim.meshes.teapot import teapot
 
 __all__ = ["COLORED", "GOAL", "SCENES", "STEEPEST", "measure", "multipliers", "scene_of", "section", "tasks"]
@@ -127,9 +128,15 @@ def _design(scene: Scene, transfer: str) -> ShadingPipeline:
 
 
 def measure(
-    name: str, filter: str | None, projection: str, contrast: float, transfer: str, size: Sequence[int]
+    name: str,
+    filter: str | None,
+    projection: str,
+    contrast: float,
+    transfer: str,
+    size: Sequence[int],
+    engine: str | None,
 ) -> dict[str, Any]:
-    """Errors, bound and cycles of a frame by the bit-accurate model of ``quotient``.
+    """Errors, bound and cycles of a frame by ``quotient``.
 
     Parameters
     ----------
@@ -137,6 +144,9 @@ def measure(
         As for `scene_of`.
     transfer : str
         One of `TRANSFERS`, of the frame.
+    engine : str or None
+        Engine that simulates the frame. ``None``: the bit-accurate model computes the same frame, and
+        `frame_cycles` its cycles.
 
     Returns
     -------
@@ -145,12 +155,14 @@ def measure(
           the frame's codes;
         - ``pixels``, ``border_pixels``: number of shown pixels, and number of shown pixels at a border;
         - ``border_error``: largest error at a border, in LSB;
-        - ``cycles_per_pixel``: cycles of `frame_cycles` without writes, divided by the shaded pixels;
+        - ``cycles_per_pixel``: cycles without those of writes, divided by the shaded pixels;
         - ``writes``: writes of constants and texels.
     """
     scene = scene_of(name, filter, projection, contrast, size)
     design = _design(scene, transfer)
-    frame = model_frame(scene, design)
+    frame = FrameSimulator(design, engine).render(scene) if engine else model_frame(scene, design)
+    spans, writes = frame.prepared.spans, frame.prepared.writes
+    cycles = frame.cycles - writes if engine else frame_cycles(unit_of(design), spans, 0)
     found = compare(scene, design, frame)
     return {
         "error": found.method_error.steady_lsb,
@@ -158,8 +170,8 @@ def measure(
         "pixels": found.visible_pixels,
         "border_pixels": found.border_pixels,
         "border_error": found.method_error.border_lsb,
-        "cycles_per_pixel": frame_cycles(unit_of(design), frame.prepared.spans, 0) / frame.pixels,
-        "writes": frame.prepared.writes,
+        "cycles_per_pixel": cycles / frame.pixels,
+        "writes": writes,
     }
 
 
@@ -198,7 +210,7 @@ def _frames(quick: bool) -> list[dict[str, Any]]:
             for contrast in _CONTRASTS
             for transfer in _TRANSFERS
         ]
-    return [{**of, "size": size} for of in found]
+    return [{**of, "size": size, "engine": None if quick else "cxxrtl"} for of in found]
 
 
 def _design_of(frame: Mapping[str, Any]) -> dict[str, Any]:
@@ -275,14 +287,15 @@ def _table(frames: Sequence[Mapping[str, Any]], designs: Mapping[str, int]) -> T
         grade: Grade = "good" if good else "bad"
         grades.append([grade if column == "largest error, LSB" else "" for column in columns])
     width, height, triangles = frames[0]["size"]
+    counted = "simulated" if frames[0]["engine"] else "computed from the lengths of spans"
     note = (
-        f"Frames of {width}x{height} pixels by the bit-accurate model, against exact normals and the same "
-        "filter in float64. An LSB is a step of the codes in the row's space. An error is green if it is at "
-        f"most {GOAL:g} LSB and within its bound, else red. Pixels at a border are left out of the error and "
-        f"of the bound: |N.L| is at most {BORDER:g} there, or with `nearest` another texel begins within "
-        f"{BORDER:g} texels. The teapot has about {triangles:,} triangles. Cycles are from the model of "
-        "cycles, without writes. Writes of texels are needed only for another texture. Multipliers are "
-        "counted before synthesis."
+        f"Frames of {width}x{height} pixels, against exact normals and the same filter in float64. An LSB is "
+        "a step of the codes in the row's space. An error is green if it is at most "
+        f"{GOAL:g} LSB and within its bound, else red. Pixels at a border are left out of the error and of "
+        f"the bound: |N.L| is at most {BORDER:g} there, or with `nearest` another texel begins within "
+        f"{BORDER:g} texels. The teapot has about {triangles:,} triangles. Cycles are {counted}, without "
+        "those of writes. Writes of texels are needed only for another texture. Multipliers are counted "
+        "before synthesis."
     )
     return Table("albedo-errors", "Errors with vertex colours and textures", columns, rows, note, grades)
 
