@@ -197,11 +197,11 @@ def _border_line(figures: Mapping[str, Any]) -> Iterator[str]:
     if count:
         most = max(figures[f"{name}_error"]["border_lsb"] for name in ("total", "method"))
         pixels = f"{count:,} pixel{'s' * (count != 1)} with {figures['border']}"
-        where = "where a light begins"
+        ends = ""
         if figures["step_lsb"]:
             step = f"{figures['step_lsb']:.1f} LSB of {SPACES['linear']}"
-            where += f", or where a highlight ends in a step of {step}"
-        yield _line("left out", f"{pixels}, {where}: largest {most:.2f} LSB")
+            ends = f", where a light begins, or a highlight ends in a step of {step}"
+        yield _line("left out", f"{pixels}{ends}: largest {most:.2f} LSB")
 
 
 def _error_lines(figures: Mapping[str, Any]) -> Iterator[str]:
