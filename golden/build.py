@@ -1,10 +1,12 @@
 """Build options of a design, which change its cost and its cycles, and no pixel."""
 
 from dataclasses import dataclass
-from typing import Literal
+from typing import TYPE_CHECKING, Literal
 
-from blysk.golden.geometry.coarse_depth import CoarseDepth
 from blysk.golden.lighting.highlight_operand import MAX_EXPONENT
+
+if TYPE_CHECKING:
+    from blysk.golden.geometry.coarse_depth import CoarseDepth
 
 __all__ = ["PIPES", "PORTS", "SETUPS", "STYLES", "TOPS", "Build", "BuildError", "Style"]
 
@@ -91,7 +93,7 @@ class Build:
     top: str = "shader"
     setups: int = 1
     geometry_style: Style | None = None
-    coarse: CoarseDepth | None = None
+    coarse: "CoarseDepth | None" = None
     bus: str = "native"
 
     def __post_init__(self) -> None:

@@ -7,7 +7,6 @@ import click
 
 from blysk.bench.tools.defaults import SEEDS
 from blysk.bench.tools.families import DEVICES, ECP5, ECP5_85F
-from blysk.bench.units.names import UNITS
 from blysk.sim.api.design import built, design
 from blysk.sim.api.options import BUILD, DESIGN, NEEDS
 from blysk.sim.cli.options import given_options, options_of
@@ -125,10 +124,13 @@ def command(
         )
     if figures:
         check_writable(figures)
-    unknown = [name for name in units if name.split(" ")[0] not in UNITS]
-    if unknown:
-        raise InputError(f"--unit {unknown[0]}", "unknown unit", f"use {', '.join(UNITS)}")
-    if not units:
+    if units:
+        # The names come from the files of the records.
+        from blysk.bench.units.names import UNITS
+
+        if unknown := [name for name in units if name.split(" ")[0] not in UNITS]:
+            raise InputError(f"--unit {unknown[0]}", "unknown unit", f"use {', '.join(UNITS)}")
+    else:
         # With --every-method the options are checked with the default method, which serves each core.
         built(design(**chosen), build)
     several = build.get("pipes", 1) > 1

@@ -3,7 +3,7 @@
 from abc import ABC, abstractmethod
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any, ClassVar, Literal, NamedTuple
+from typing import TYPE_CHECKING, Any, ClassVar, Literal, NamedTuple
 
 import numpy as np
 
@@ -11,7 +11,6 @@ from blysk.golden.beats import Spans
 from blysk.golden.cosines.chord_setup import ChordSetup
 from blysk.golden.cosines.quotient_spans import QuotientSpans
 from blysk.golden.frame_constants import NOT_READ, FrameConstants, LightMeanings
-from blysk.golden.geometry.geometry import Geometry
 from blysk.golden.lighting.gate import Gate
 from blysk.golden.lighting.highlight_operand import HighlightOperand
 from blysk.golden.lighting.lobe import Lobe
@@ -24,6 +23,9 @@ from blysk.golden.number.unit_vector import COMPONENT, ONE_SQUARED
 from blysk.golden.reference.curves import interpolate
 from blysk.golden.reference.raster import Raster
 from blysk.golden.reference.scene import Scene
+
+if TYPE_CHECKING:
+    from blysk.golden.geometry.geometry import Geometry
 
 __all__ = ["Interpolator", "Operand", "Operands"]
 
@@ -331,7 +333,7 @@ class Interpolator(ABC):
             Whether there is specular light.
         """
 
-    def geometry(self, lights: int) -> Geometry:
+    def geometry(self, lights: int) -> "Geometry":
         """Geometry that makes the method's spans from triangles, for a number of lights.
 
         Raises

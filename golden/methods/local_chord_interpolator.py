@@ -4,14 +4,13 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import ClassVar
+from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
 
 from blysk.golden.beats import Spans
 from blysk.golden.cosines.chord_setup import ChordSetup, SpanValues
 from blysk.golden.frame_constants import FrameConstants
-from blysk.golden.geometry.geometry import Geometry
 from blysk.golden.lighting.factor import Factor
 from blysk.golden.lighting.highlight_operand import HighlightOperand
 from blysk.golden.lighting.lobe import Lobe
@@ -23,6 +22,9 @@ from blysk.golden.number.fixed import SQ, Fixed
 from blysk.golden.number.spans import pixels_of
 from blysk.golden.number.unit_vector import ONE_SQUARED
 from blysk.golden.reference.raster import Raster
+
+if TYPE_CHECKING:
+    from blysk.golden.geometry.geometry import Geometry
 
 __all__ = ["METHODS", "LocalChordInterpolator"]
 
@@ -189,7 +191,7 @@ class LocalChordInterpolator(Interpolator):
         """``True``: a light cuts spans where its quadratics miss their tolerances."""
         return True
 
-    def geometry(self, lights: int) -> Geometry:
+    def geometry(self, lights: int) -> "Geometry":
         """Raise `ValueError`, because triangles give no values."""
         raise ValueError(f"triangles give normals, and {self.name} takes values; use another method")
 

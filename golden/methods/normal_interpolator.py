@@ -3,13 +3,13 @@
 from abc import abstractmethod
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from blysk.golden.beats import Spans
 from blysk.golden.cosines.chord import Chord
 from blysk.golden.frame_constants import UNIT_VECTORS, FrameConstants, LightMeanings
-from blysk.golden.geometry.geometry import Geometry
 from blysk.golden.lighting.gate import Gate
 from blysk.golden.lighting.highlight_gate import GateLimits, HighlightGate
 from blysk.golden.lighting.highlight_operand import HighlightOperand
@@ -21,6 +21,9 @@ from blysk.golden.normals.middle_normal import MAX_SPAN_ANGLE
 from blysk.golden.number.fixed import Fixed
 from blysk.golden.number.unit_vector import CODE_LENGTH_ERROR, COMPONENT
 from blysk.golden.reference.raster import Raster
+
+if TYPE_CHECKING:
+    from blysk.golden.geometry.geometry import Geometry
 
 __all__ = ["EndNormalInterpolator", "NormalInterpolator", "difference_rounding"]
 
@@ -108,8 +111,11 @@ class EndNormalInterpolator(Interpolator):
         vectors = [Fixed(COMPONENT, codes) for codes in (constants.direction, constants.halfway)]
         return self.compute(left, right, np.asarray(spans.length), *vectors)
 
-    def geometry(self, lights: int) -> Geometry:
+    def geometry(self, lights: int) -> "Geometry":
         """Geometry that makes unit normals."""
+        # Commands that build no geometry start without its files.
+        from blysk.golden.geometry.geometry import Geometry
+
         return Geometry()
 
     def cut(self, cutter: SpanCutter) -> tuple[Raster, int]:

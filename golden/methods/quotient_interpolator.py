@@ -2,7 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import ClassVar
+from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
 
@@ -10,7 +10,6 @@ from blysk.golden.beats import Spans
 from blysk.golden.cosines.quotient import Quotient
 from blysk.golden.cosines.quotient_spans import MARGIN, QuotientSpans, SpanVectors
 from blysk.golden.frame_constants import FrameConstants, LightMeanings
-from blysk.golden.geometry.geometry import Geometry
 from blysk.golden.lighting.highlight_operand import HighlightOperand
 from blysk.golden.lighting.quotient_lobe import QuotientLobe
 from blysk.golden.methods.frame_steps import Bound, ErrorBounds, ExactShading, SpanCutter, SpanFiller
@@ -21,6 +20,9 @@ from blysk.golden.reference.light_frame import light_frames
 from blysk.golden.reference.raster import Raster
 from blysk.golden.reference.reflection import ReflectionModel
 from blysk.golden.reference.scene import Scene
+
+if TYPE_CHECKING:
+    from blysk.golden.geometry.geometry import Geometry
 
 __all__ = ["METHODS", "QuotientErrors", "QuotientInterpolator"]
 
@@ -146,8 +148,11 @@ class QuotientInterpolator(Interpolator):
             *([f"constants: as L write sin a, 0, cos a, times {model.ONE}; H is not read"] * highlights),
         ]
 
-    def geometry(self, lights: int) -> Geometry:
+    def geometry(self, lights: int) -> "Geometry":
         """Geometry that makes vectors. With several lights it turns them."""
+        # Commands that build no geometry start without its files.
+        from blysk.golden.geometry.geometry import Geometry
+
         return Geometry(vectors=True, rotates=lights > 1)
 
     def constants_for(self, scene: Scene, constants: Sequence[FrameConstants]) -> list[FrameConstants]:

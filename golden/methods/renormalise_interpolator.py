@@ -2,12 +2,11 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import ClassVar
+from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
 
 from blysk.golden.beats import Spans
-from blysk.golden.geometry.geometry import Geometry
 from blysk.golden.methods.frame_steps import Bound, ErrorBounds, ExactShading, SpanCutter, SpanFiller
 from blysk.golden.methods.interpolator import Operand
 from blysk.golden.methods.normal_interpolator import NormalInterpolator
@@ -17,6 +16,9 @@ from blysk.golden.normals.renormaliser import Renormaliser
 from blysk.golden.number.fixed import Fixed
 from blysk.golden.number.spans import pixels_of
 from blysk.golden.reference.raster import Raster
+
+if TYPE_CHECKING:
+    from blysk.golden.geometry.geometry import Geometry
 
 __all__ = ["METHODS", "RenormaliseInterpolator"]
 
@@ -85,8 +87,11 @@ class RenormaliseInterpolator(NormalInterpolator):
             "is counted in status_out_of_range_spans"
         ]
 
-    def geometry(self, lights: int) -> Geometry:
+    def geometry(self, lights: int) -> "Geometry":
         """Geometry that makes true lines."""
+        # Commands that build no geometry start without its files.
+        from blysk.golden.geometry.geometry import Geometry
+
         return Geometry(lines=True)
 
     def cut(self, cutter: SpanCutter) -> tuple[Raster, int]:

@@ -7,12 +7,10 @@ from typing import Any, TypeVar, Unpack, cast
 
 from blysk.golden.albedo.albedo import Albedo
 from blysk.golden.build import BuildError
-from blysk.golden.geometry.coarse_depth import CoarseDepth
 from blysk.golden.lighting.lobe import Lobe
 from blysk.golden.pipeline import ShadingPipeline
 from blysk.golden.pixel_pipelines import PixelPipelines
 from blysk.golden.presets import METHODS, MIRROR_LOBES, PUBLISHED, preset
-from blysk.golden.render import Renderer
 from blysk.sim.api import costed_design
 from blysk.sim.api.options import BUILD, DESIGN, NEEDS, DesignOptions
 from blysk.sim.api.settings import Settings, checked, read_settings
@@ -164,6 +162,9 @@ def built(design: AnyDesign, given: Mapping[str, Any]) -> AnyDesign:
         remedy = "leave one of them out"
         raise OptionError("top", "shader", "it takes spans, and hardware geometry takes triangles", remedy)
     if "coarse" in values:
+        # Commands that build no geometry start without its files.
+        from blysk.golden.geometry.coarse_depth import CoarseDepth
+
         values["coarse"] = CoarseDepth(*values["coarse"])
     try:
         made = cast(AnyDesign, design.built(**values))
@@ -176,6 +177,8 @@ def built(design: AnyDesign, given: Mapping[str, Any]) -> AnyDesign:
     except ValueError as error:
         raise OptionError("pipes", made.build.pipes, str(error), "give fewer") from None
     if made.build.takes_triangles:
+        from blysk.golden.render import Renderer
+
         try:
             Renderer(made)
         except ValueError as error:

@@ -48,7 +48,8 @@ with contextlib.redirect_stdout(io.StringIO()), contextlib.redirect_stderr(io.St
     early = loaded("numpy", "tomllib", "blysk.golden.presets")
     helped = [main([command, "--help"]) for command in ("render", "verilog")]
     refused = [main(words.split()) for words in sys.argv[1:]]
-print(listed, early, helped, set(refused), loaded("amaranth", "matplotlib", "scipy", "trimesh"))
+heavy = loaded("amaranth", "blysk.golden.geometry", "matplotlib", "scipy", "trimesh")
+print(listed, early, helped, set(refused), heavy)
 print(errors.getvalue().count("blysk: "))
 """
 
