@@ -1,4 +1,4 @@
-"""GLB and glTF files: checks that trimesh lacks, materials, and a text that trimesh reads right."""
+"""GLB and glTF files: their materials, checks that trimesh lacks, and a text that trimesh reads right."""
 
 import importlib.util
 import json
@@ -27,8 +27,8 @@ __all__ = [
     "tell_contents",
 ]
 
-# Extensions in three groups: they are read; they have no effect on the parts that are read; they are left out
-# of the picture, and listed.
+# Three groups of extensions: ``_READ`` are read. ``_SILENT`` have no effect on the parts that are read.
+# ``_TOLD`` are left out of the picture, and listed.
 _READ = {"KHR_draco_mesh_compression", "KHR_mesh_quantization", "EXT_mesh_gpu_instancing"}
 _UNLIT, _STRENGTH = "KHR_materials_unlit", "KHR_materials_emissive_strength"
 _READ |= {"KHR_node_visibility", "KHR_texture_transform", "EXT_texture_webp", GLOSSY, _UNLIT, _STRENGTH}
@@ -137,7 +137,10 @@ def _check_nodes(document: dict) -> None:
     below = [child for row in children for child in row]
     for index in [*below, *(root for row in roots for root in row)]:
         if isinstance(index, bool) or not isinstance(index, int) or not 0 <= index < len(nodes):
-            raise Refused(f"it refers to node {shown(str(index))} (from 0), but there are {len(nodes)}")
+            raise Refused(
+                f"it refers to node {shown(str(index))}, counted from 0, but the number of nodes is "
+                f"{len(nodes)}"
+            )
     if len(set(below)) < len(below):
         raise Refused("one of its nodes has two parents", "export it with one parent for each node")
     reached = list(set(range(len(nodes))).difference(below))
@@ -185,7 +188,8 @@ def find_gltf_materials(
                 isinstance(index, bool) or not isinstance(index, int) or not 0 <= index < len(texts)
             ):
                 raise Refused(
-                    f"a mesh refers to material {shown(str(index))} (from 0), but there are {len(texts)}",
+                    f"a mesh refers to material {shown(str(index))}, counted from 0, but the number of "
+                    f"materials is {len(texts)}",
                     ONE_MATERIAL,
                 )
     found.names += [str(text.get("name", "")) for text in texts]
@@ -253,7 +257,7 @@ def _cutoff(text: dict, alpha: float, key: str, name: str) -> float:
     cutoff = text.get("alphaCutoff", 0.5)
     for what, value, most in (("alphaCutoff", cutoff, 1e30), (f"alpha of {key}", alpha, 1)):
         if not _are_numbers([value], 1) or not 0 <= value <= most:
-            wanted = "from 0" if what == "alphaCutoff" else "from 0 to 1"
+            wanted = "of at least 0" if what == "alphaCutoff" else "from 0 to 1"
             raise Refused(
                 f"material {name!r} has the {what} {shown(str(value))!r}, not a number {wanted}", ONE_MATERIAL
             )
@@ -271,7 +275,7 @@ def _emission(text: dict, name: str) -> Triple | None:
         if not _are_numbers(numbers, 3) or not all(0 <= number <= 1e30 for number in numbers):
             what = "three numbers" if numbers is given else "a number"
             raise Refused(
-                f"material {name!r} has {key} {shown(str(value))!r}, not {what} from 0", ONE_MATERIAL
+                f"material {name!r} has {key} {shown(str(value))!r}, not {what} of at least 0", ONE_MATERIAL
             )
     red, green, blue = (float(channel) * float(factor) for channel in given)
     return (red, green, blue) if red or green or blue else None

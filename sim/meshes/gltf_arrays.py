@@ -132,7 +132,9 @@ class _Arrays:
         if "bufferView" in accessor:
             values = self._rows(accessor, count, kind, width)
         if sparse := accessor.get("sparse"):
-            few = whole(sparse["count"], "the count of a sparse array", count + 1)
+            few = whole(sparse["count"], "the count of a sparse array")
+            if few > count:
+                raise Refused(f"it has the count of a sparse array {few}, but the array has {count} elements")
             where = sparse["indices"]
             places = self._rows(where, few, np.dtype(_TYPES[where["componentType"]]), 1)[:, 0]
             if few and not 0 <= places.min() <= places.max() < count:
@@ -162,7 +164,7 @@ class _Arrays:
 
         compressed = primitive["extensions"][_DRACO]
         views = self.document.get("bufferViews", [])
-        place = whole(compressed.get("bufferView"), "Draco-compressed data", len(views))
+        place = whole(compressed.get("bufferView"), "Draco-compressed data in the view", len(views))
         data = view_bytes(views[place], self.buffers)
         try:
             mesh = DracoPy.decode(data)

@@ -45,11 +45,11 @@ def listed(document: dict, name: str) -> list[dict]:
 
 
 def whole(value: Any, what: str, below: float = math.inf, remedy: str = REEXPORT) -> int:
-    """A whole number from 0. Other values are `Refused`: Python counts a negative index from the end."""
+    """A whole number of at least 0. Others are `Refused`: Python counts a negative index from the end."""
     if isinstance(value, bool) or not isinstance(value, int) or value < 0:
-        raise Refused(f"it has {what} {shown(str(value))}, not a whole number from 0", remedy)
+        raise Refused(f"it has {what} {shown(str(value))}, not a whole number of at least 0", remedy)
     if value >= below:
-        raise Refused(f"it has {what} {value} (from 0), but there are {below}", remedy)
+        raise Refused(f"it has {what} {value}, counted from 0, but there are only {below}", remedy)
     return value
 
 

@@ -14,6 +14,7 @@ from blysk.golden.reference.geometry import LARGEST_COORDINATE, Mesh
 from blysk.golden.reference.light import Light
 from blysk.sim.meshes.materials import FileMaterial, Found
 from blysk.sim.meshes.normals import crease_normals, face_directions, repaired_normals, transformed
+from blysk.sim.meshes.polygons import check_corners
 from blysk.sim.meshes.refusal import MAX_FACES, ONE_MATERIAL, Refused
 
 if TYPE_CHECKING:
@@ -99,9 +100,7 @@ def assembled(
     offset = 0
     for matrix, geometry in nodes:
         part, triangles = np.array(geometry.vertices), np.array(geometry.faces)
-        if not 0 <= triangles.min() <= triangles.max() < len(part):
-            wrong = triangles.min() if triangles.min() < 0 else triangles.max()
-            raise Refused(f"a face refers to vertex {wrong} (from 0), but there are {len(part)}")
+        check_corners(triangles, len(part))
         stored = np.full(part.shape, np.nan)
         # Only the cache shows whether normals were stored. Reading the property would compute them.
         has_normals = "vertex_normals" in geometry._cache
@@ -154,7 +153,7 @@ def _colors(given: np.ndarray | None, faces: np.ndarray, found: Found) -> np.nda
     if wrong := np.flatnonzero(~(np.isfinite(seen) & (seen >= -_ROUNDED)).all(axis=1)).tolist():
         text = " ".join(f"{channel:g}" for channel in seen[wrong[0]].tolist())
         many = "three" if given.shape[1] == 3 else "four"
-        raise Refused(f"a vertex has the colour {text!r}, not {many} numbers from 0", ONE_MATERIAL)
+        raise Refused(f"a vertex has the colour {text!r}, not {many} numbers of at least 0", ONE_MATERIAL)
     over = int((seen > 1 + _ROUNDED).any(axis=1).sum())
     found.tell("vertex colour's part over 1", "vertex colours' parts over 1", over)
     result = np.ones((len(given), 4))

@@ -35,6 +35,7 @@ from blysk.sim.meshes.normals import DEFAULT_CREASE
 from blysk.sim.meshes.obj import read_obj, split_obj
 from blysk.sim.meshes.parts import scene_of
 from blysk.sim.meshes.ply import find_ply_images, read_ply
+from blysk.sim.meshes.polygons import check_corners
 from blysk.sim.meshes.refusal import MAX_FACES, REEXPORT, Refused, refers
 from blysk.sim.meshes.stl import read_stl
 from blysk.sim.meshes.teapot import DEFAULT_TRIANGLES, teapot
@@ -273,9 +274,7 @@ def _of_arrays(source: Sequence[ArrayLike], crease_angle: float) -> LoadedMesh:
     vertices, faces = arrays["vertices"], arrays["faces"]
     if len(faces) > MAX_FACES:
         raise Refused(f"it has {len(faces)} triangles; the limit is {MAX_FACES}", "simplify it")
-    if not 0 <= faces.min() <= faces.max() < len(vertices):
-        wrong = faces.min() if faces.min() < 0 else faces.max()
-        raise Refused(f"a face refers to vertex {wrong} (from 0), but there are {len(vertices)}")
+    check_corners(faces, len(vertices))
     normals = arrays.get("normals", np.full(vertices.shape, np.nan))
     if normals.shape != vertices.shape:
         raise Refused(f"there are {len(normals)} normals for {len(vertices)} vertices", GIVE_ARRAYS)

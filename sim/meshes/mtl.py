@@ -253,7 +253,8 @@ def _emission(words: list[str], name: str) -> Triple | None:
     numbers = [_float(word) for word in (words * 3 if len(words) == 1 else words)]
     if len(numbers) != 3 or not all(0 <= number < math.inf for number in numbers):
         raise Refused(
-            f"material {name!r} has Ke {shown(' '.join(words))!r}, not three numbers from 0", ONE_MATERIAL
+            f"material {name!r} has Ke {shown(' '.join(words))!r}, not three numbers of at least 0",
+            ONE_MATERIAL,
         )
     red, green, blue = numbers
     return (red, green, blue) if any(numbers) else None

@@ -17,10 +17,12 @@ _FANS = 16
 
 
 def check_corners(corners: np.ndarray, vertices: int) -> None:
-    """Refuse indices, from 0, of vertices that do not exist."""
+    """Refuse indices of vertices that do not exist. The first vertex has index 0."""
     if corners.size and not 0 <= corners.min() <= corners.max() < vertices:
         wrong = corners.min() if corners.min() < 0 else corners.max()
-        raise Refused(f"a face refers to vertex {wrong} (from 0), but there are {vertices}")
+        raise Refused(
+            f"a face refers to vertex {wrong}, counted from 0, but the number of vertices is {vertices}"
+        )
 
 
 def cut_polygons(

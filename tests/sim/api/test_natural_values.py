@@ -159,7 +159,8 @@ def test_a_mesh_with_colours_is_told(recwarn):
         (
             (V, [[0, 1, 3]]),
             {},
-            "the arrays of a mesh: a face refers to vertex 3 (from 0), but there are 3; mend",
+            "the arrays of a mesh: a face refers to vertex 3, counted from 0, but the number of vertices "
+            "is 3; mend",
         ),
         (
             (V, [[0, 1, 1.5]]),

@@ -243,7 +243,7 @@ def test_obj_light_of_its_own(tmp_path):
     assert loaded.ignored == ("1 texture",)
     for words in ("-1 0 0", "x", "1 2", "inf 0 0", "nan"):
         put(tmp_path / "a.mtl", f"newmtl a\nKe {words}\n")
-        check_refused(tmp_path / "a.obj", "has Ke", "not three numbers from 0")
+        check_refused(tmp_path / "a.obj", "has Ke", "not three numbers of at least 0")
 
 
 # PLY

@@ -175,7 +175,7 @@ def test_instances(path, kind):
     ("attributes", "reason"),
     [
         ({}, "no count of instances"),
-        ({"TRANSLATION": -1}, "not a whole number from 0"),
+        ({"TRANSLATION": -1}, "not a whole number of at least 0"),
         ({"TRANSLATION": 9}, "there are 2"),
         ({"TRANSLATION": 1}, "not 3 finite numbers"),
     ],
@@ -228,7 +228,7 @@ NEGATIVE = {
 def test_negative_numbers(path, change):
     document, buffer = plain()
     change(document)
-    check_refused(path, "not a whole number from 0", content=(document, buffer))
+    check_refused(path, "not a whole number of at least 0", content=(document, buffer))
 
 
 @pytest.mark.parametrize("kind", ["<i1", "<i2", "<f4"])

@@ -78,8 +78,14 @@ def test_a_cutoff_that_drops_nothing_is_left_out(tmp_path):
 @pytest.mark.parametrize(
     ("material", "reason"),
     [
-        (base(1, 1, 1, 1, alphaMode="MASK", alphaCutoff=-0.1), "the alphaCutoff '-0.1', not a number from 0"),
-        (base(1, 1, 1, 1, alphaMode="MASK", alphaCutoff="a"), "the alphaCutoff 'a', not a number from 0"),
+        (
+            base(1, 1, 1, 1, alphaMode="MASK", alphaCutoff=-0.1),
+            "the alphaCutoff '-0.1', not a number of at least 0",
+        ),
+        (
+            base(1, 1, 1, 1, alphaMode="MASK", alphaCutoff="a"),
+            "the alphaCutoff 'a', not a number of at least 0",
+        ),
         (base(1, 1, 1, 1, alphaMode="MASK", alphaCutoff=math.nan), "the alphaCutoff 'nan', not a number"),
         (
             base(1, 1, 1, 1.5, alphaMode="MASK"),
@@ -94,7 +100,7 @@ def test_bad_cutoffs_are_refused(tmp_path, material, reason):
 def test_a_bad_alpha_of_a_vertex_is_refused(tmp_path):
     content = material_gltf([base(1, 1, 1, 1, alphaMode="MASK")], [0])
     content = with_array(content, "COLOR_0", [[1, 0, 0, 1]] * 2 + [[1, 0, 0, math.nan]])
-    reason = "a vertex has the colour '1 0 0 nan', not four numbers from 0"
+    reason = "a vertex has the colour '1 0 0 nan', not four numbers of at least 0"
     check_refused(tmp_path / "a.glb", reason, content=content)
 
 
@@ -112,7 +118,7 @@ def test_colours_over_1_are_told(tmp_path):
             "COLOR_0",
             [[math.nan, 0, 1]] * 3,
             {},
-            "a vertex has the colour 'nan 0 1', not three numbers from 0",
+            "a vertex has the colour 'nan 0 1', not three numbers of at least 0",
         ),
         ("COLOR_0", [[math.inf, 0, 1]] * 3, {}, "a vertex has the colour 'inf 0 1'"),
         ("COLOR_0", [[0, -0.5, 1]] * 3, {}, "a vertex has the colour '0 -0.5 1'"),
@@ -158,7 +164,7 @@ def test_colours_of_another_number_than_positions(tmp_path):
     assert load(tmp_path / "a.glb", (document, buffer)).ignored == told
     document, buffer = mesh_gltf()
     document["meshes"][0]["primitives"][0]["attributes"]["COLOR_0"] = 9
-    reason = "it has a mesh with the accessor 9 (from 0), but there are 2"
+    reason = "it has a mesh with the accessor 9, counted from 0, but there are only 2"
     check_refused(tmp_path / "a.glb", reason, content=(document, buffer))
 
 
@@ -243,13 +249,16 @@ def test_emission(tmp_path, material, emission, told):
 @pytest.mark.parametrize(
     ("material", "reason"),
     [
-        ({"emissiveFactor": [1, 1]}, "emissiveFactor '[1, 1]', not three numbers from 0"),
-        ({"emissiveFactor": [1, 1, 10**400]}, "not three numbers from 0"),
-        ({"emissiveFactor": [1, 1, -1]}, "emissiveFactor '[1, 1, -1]', not three numbers from 0"),
-        ({"emissiveFactor": [1, 1, math.nan]}, "emissiveFactor '[1, 1, nan]', not three numbers from 0"),
+        ({"emissiveFactor": [1, 1]}, "emissiveFactor '[1, 1]', not three numbers of at least 0"),
+        ({"emissiveFactor": [1, 1, 10**400]}, "not three numbers of at least 0"),
+        ({"emissiveFactor": [1, 1, -1]}, "emissiveFactor '[1, 1, -1]', not three numbers of at least 0"),
+        (
+            {"emissiveFactor": [1, 1, math.nan]},
+            "emissiveFactor '[1, 1, nan]', not three numbers of at least 0",
+        ),
         (
             {"extensions": {"KHR_materials_emissive_strength": {"emissiveStrength": "2"}}},
-            "emissiveStrength '2', not a number from 0",
+            "emissiveStrength '2', not a number of at least 0",
         ),
         (
             {"extensions": {GLOSSY: {"specularFactor": [1, 1, 2]}}},

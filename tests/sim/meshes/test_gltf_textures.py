@@ -142,8 +142,8 @@ def huge_png(width, height):
         ({"uri": "data:;base64,A"}, "the text of its image 0 is not base64"),
         ({"uri": "data:;base64,@@" + base64.b64encode(CHECKER).decode()}, "its image 0 is not base64"),
         ({"uri": "data:,"}, "its image 'number 0' is empty"),
-        ({"bufferView": 9}, "it has an image in the view 9 (from 0), but there are 3"),
-        ({"bufferView": -1}, "it has an image in the view -1, not a whole number from 0"),
+        ({"bufferView": 9}, "it has an image in the view 9, counted from 0, but there are only 3"),
+        ({"bufferView": -1}, "it has an image in the view -1, not a whole number of at least 0"),
     ],
     ids=range(10),
 )
@@ -165,11 +165,23 @@ def transform(**values):
 @pytest.mark.parametrize(
     ("parts", "reason"),
     [
-        ({"info": {"index": 1}}, "it has a material with the texture 1 (from 0), but there are 1"),
-        ({"info": {"index": "0"}}, "it has a material with the texture 0, not a whole number from 0"),
-        ({"info": {"texCoord": -1}}, "it has a texture with the texCoord -1, not a whole number from 0"),
-        ({"texture": {"source": 3}}, "it has a texture with the image 3 (from 0), but there are 1"),
-        ({"texture": {"sampler": 0}}, "it has a texture with the sampler 0 (from 0), but there are 0"),
+        (
+            {"info": {"index": 1}},
+            "it has a material with the texture 1, counted from 0, but there are only 1",
+        ),
+        ({"info": {"index": "0"}}, "it has a material with the texture 0, not a whole number of at least 0"),
+        (
+            {"info": {"texCoord": -1}},
+            "it has a texture with the texCoord -1, not a whole number of at least 0",
+        ),
+        (
+            {"texture": {"source": 3}},
+            "it has a texture with the image 3, counted from 0, but there are only 1",
+        ),
+        (
+            {"texture": {"sampler": 0}},
+            "it has a texture with the sampler 0, counted from 0, but there are only 0",
+        ),
         ({"sampler": {"wrapS": 9729}}, "a sampler has the wrapS '9729', not one of 10497, 33648, 33071"),
         ({"sampler": {"magFilter": 9987}}, "a sampler has the magFilter '9987', not one of 9728, 9729"),
         ({"sampler": {"minFilter": [1]}}, "a sampler has the minFilter '[1]', not one of 9728"),

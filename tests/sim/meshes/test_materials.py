@@ -336,8 +336,12 @@ RANGE = "not four numbers from 0 to 1"
 @pytest.mark.parametrize(
     ("materials", "index", "reason"),
     [
-        ([base(1, 0, 0, 1)], 1, "a mesh refers to material 1 (from 0), but there are 1"),
-        (None, 0, "a mesh refers to material 0 (from 0), but there are 0"),
+        (
+            [base(1, 0, 0, 1)],
+            1,
+            "a mesh refers to material 1, counted from 0, but the number of materials is 1",
+        ),
+        (None, 0, "a mesh refers to material 0, counted from 0, but the number of materials is 0"),
         ([base(1, 0, 0, 1)], -1, "a mesh refers to material -1"),
         ([base(1, 0, 0, 1)], 10**30, "a mesh refers to material 1000000000"),
         ([base(1, 0, 0, 1)], "0", "a mesh refers to material 0"),

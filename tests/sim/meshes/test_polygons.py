@@ -141,7 +141,7 @@ SQUARE = "v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\n"
         (SQUARE + "f 1 2 1_0 4\n", "corners '1 2 1_0 4'"),
         (SQUARE + "f 1 2 3.5\n", "corners"),
         (SQUARE + "f 1/1/1/1 2 3\n", "corners"),
-        (SQUARE + "f 1 2 3 9\n", "vertex 8 (from 0), but there are 4"),
+        (SQUARE + "f 1 2 3 9\n", "vertex 8, counted from 0, but the number of vertices is 4"),
         (SQUARE + "f 1 2 3 -9\n", "index -9"),
         (SQUARE.replace("v 1 0 0", "v 1_0 0 0") + "f 1 2 3\n", "'1_0 0 0', not 3 numbers"),
         (SQUARE + "vn 0 0 1_0\nf 1//1 2//1 3//1\n", "not 3 numbers"),
@@ -179,7 +179,10 @@ HEAD = (
         ("0 0 0\n1 0 0\n1 1 0\n0 1 0\n3 0 1 2\n2 0 1\n", "fewer than 3 corners"),
         ("0 0 0\n1 0 0\n1 1 0\n0 1 0\n3 0 1 2\n3 0 1 1_0\n", "the character _"),
         ("0 0 0\n1 0 0\n1 1 0\n0 1 0\n3 0 1 2\n3 0 1 2.5\n", "not a whole number"),
-        ("0 0 0\n1 0 0\n1 1 0\n0 1 0\n3 0 1 2\n3 0 1 4\n", "vertex 4 (from 0), but there are 4"),
+        (
+            "0 0 0\n1 0 0\n1 1 0\n0 1 0\n3 0 1 2\n3 0 1 4\n",
+            "vertex 4, counted from 0, but the number of vertices is 4",
+        ),
         ("0 0 0\n1 0 0\n1 1 0\n0 1 zero\n3 0 1 2\n3 0 1 2\n", "not a number"),
     ],
 )

@@ -62,7 +62,7 @@ def test_objects_and_materials_weld_to_one(tmp_path):
         ("v 0 0 0\nv 1 1 1\nv 2 2 2\nf 1 2 3", "none of its faces has an area"),
         (CORNERS + "v 9 9 9", "it has no faces"),
         ("v 0 0 0\nv 1 0 0\nl 1 2", "it has no faces"),
-        (CORNERS + "f 1 2 4", "refers to vertex 3 (from 0), but there are 3"),
+        (CORNERS + "f 1 2 4", "refers to vertex 3, counted from 0, but the number of vertices is 3"),
         (CORNERS + "f 0 1 2", "vertex index 0"),
         (CORNERS + "f 1 2 3\nf 1 2", "fewer than 3 corners"),
         (CORNERS + "f 1 2 -9", "has the index -9, with 3 v before it"),
@@ -156,7 +156,7 @@ def test_ply_negative_index(tmp_path):
 
 @pytest.mark.parametrize("index", [3, 2**31, 2**32 - 1])
 def test_gltf_index_out_of_range(tmp_path, index):
-    reason = f"a face refers to vertex {index} (from 0), but there are 3"
+    reason = f"a face refers to vertex {index}, counted from 0, but the number of vertices is 3"
     check_refused(tmp_path / "a.glb", reason, content=mesh_gltf(faces=[0, 1, index]))
 
 
@@ -191,10 +191,10 @@ def test_corrupt_gltf_does_not_load_its_neighbour(tmp_path):
         ([[1, 2], [2], []], "has two parents"),
         ([[1, 1], []], "has two parents"),
         ([[k + 1] for k in range(9999)] + [[0]], "form a circle"),
-        ([[1]], "refers to node 1 (from 0), but there are 1"),
-        ([[-1]], "refers to node -1 (from 0)"),
-        ([["0"]], "refers to node 0 (from 0)"),
-        ([[True], []], "refers to node True (from 0)"),
+        ([[1]], "refers to node 1, counted from 0, but the number of nodes is 1"),
+        ([[-1]], "refers to node -1, counted from 0"),
+        ([["0"]], "refers to node 0, counted from 0"),
+        ([[True], []], "refers to node True, counted from 0"),
         ([0], "a part is missing"),
         ([[1], []], "is twice in a scene"),
     ],

@@ -184,7 +184,11 @@ def test_ply_strips(tmp_path, form, rows, faces):
 
 def test_ply_strip_of_a_vertex_that_is_not_there(tmp_path):
     text = PLY.replace("element face", "element tristrips").replace("3 0 1 2", "3 0 1 3")
-    check_refused(tmp_path / "a.ply", "a face refers to vertex 3 (from 0), but there are 3", content=text)
+    check_refused(
+        tmp_path / "a.ply",
+        "a face refers to vertex 3, counted from 0, but the number of vertices is 3",
+        content=text,
+    )
 
 
 def binary_stl(tail=b"", attribute=0, head=b"", count=1):
