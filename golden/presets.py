@@ -53,7 +53,9 @@ _OWN = (
     local_chord_interpolator,
     quotient_interpolator,
 )
-"""Modules of this project with dictionaries ``METHODS``, some with ``PUBLISHED``, in the order of tables."""
+"""Modules of this project, in the order in which tables list their methods. Each has a dictionary
+``METHODS``, and some have ``PUBLISHED``.
+"""
 
 _MODULES = (
     *_OWN,
@@ -88,7 +90,8 @@ LOBES: dict[str, Lobe] = {
     lobe.name: lobe
     for lobe in (
         Lobe(BLINN),
-        # The term of exponent 1 ends with a kink at u = 0.293, beside the start of a step of 1/256.
+        # At exponent 1 the lobe reaches 0 with a kink at u = 0.293. With 64 steps an octave a step there is
+        # 1/256 wide. The kink falls almost on the start of a step, where it makes little error.
         Lobe(COPLANAR_PHONG, octaves=10, steps=64),
         Lobe(BECKMANN),
         Lobe(GGX),
@@ -128,8 +131,8 @@ def default_method(
     - an operand;
     - a setup interval.
 
-    A gate gets ``quadratic``, because ``renormalise`` has no bound for a highlight gate. No method of the
-    documents is more exact, or takes fewer cycles.
+    A gate gets ``quadratic``, because ``renormalise`` has no bound for a highlight gate. No other
+    method of the documents is more exact than ``quadratic``, or takes fewer cycles than it.
 
     Parameters
     ----------

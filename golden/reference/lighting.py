@@ -119,7 +119,7 @@ class Material:
         if not 0 <= self.alpha <= 1:
             raise ValueError(f"a material's alpha must be in 0 to 1, not {self.alpha}")
         if self.cutoff is not None and not 0 <= self.cutoff < math.inf:
-            raise ValueError(f"a material's cutoff must be a finite number from 0, not {self.cutoff}")
+            raise ValueError(f"a material's cutoff must be a finite number of at least 0, not {self.cutoff}")
         for name in ("ambient", "diffuse", "specular", "emission"):
             object.__setattr__(self, name, color_triple(f"a material's {name}", getattr(self, name)))
         object.__setattr__(self, "exponent", operator.index(self.exponent))
