@@ -29,7 +29,7 @@ for number in running:
 class _Guard:
     """A small process that guards process groups: it kills them when a pipe from this process closes.
 
-    The guard reads the numbers of the groups that run from this pipe. If this process ends, the system closes
+    From this pipe the guard reads which groups run, by their numbers. If this process ends, the system closes
     the pipe, even after SIGKILL.
     """
 
@@ -96,7 +96,7 @@ _guard = _Guard()
 
 
 class Process(_Popen):
-    """A program in a process group of its own. The group is killed when this process ends, even by SIGKILL.
+    """A program in a process group of its own. When this process ends, even by SIGKILL, the group is killed.
 
     `kill` kills the group, with all processes that the program started. On systems other than POSIX this is
     ``subprocess.Popen``.

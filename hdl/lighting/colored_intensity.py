@@ -46,7 +46,7 @@ class ColoredIntensityUnit(IntensityUnit):
 
     The latency is ``9 + ceil(log2(lights + 1))`` cycles: terms, factors, products, adder tree, rounded light
     on the surface, operands, product, sum, rounding, saturation. Tints take 1 more. The initiation interval
-    is 1. Each channel has one multiplier of 18 by 17 bits more than in an `IntensityUnit`.
+    is 1. Each channel has one more multiplier than in an `IntensityUnit`, of 18 by 17 bits.
 
     Parameters
     ----------
@@ -79,7 +79,7 @@ class ColoredIntensityUnit(IntensityUnit):
         return 7 + model.lights.bit_length() + model.tints
 
     def staged(self, m, operands):
-        """Registers of the terms, and the albedo, delayed to the operands of its product."""
+        """Registers of the terms; and the albedo, delayed until the operands of its product are loaded."""
         p, found = self.model, {}
         if p.lights:
             found = {kind: self.register(m, operands[kind], f"terms_{kind}") for kind in self.kinds}
@@ -186,7 +186,7 @@ class CompactColoredIntensityUnit(CompactIntensityUnit):
         notes = [Signal(note, name=f"note_{stage}") for stage in range(4)]
         issued, multiplied, added, rounding = notes
         valid, last_channel = Signal(), p.channels - 1
-        # Without reset a multiplier's own registers can take their place.
+        # These registers have no reset, so that synthesis can use a multiplier's own registers for them.
         factors = [
             Signal(FixedShape(of), name=name, reset_less=True)
             for of, name in ((_FACTOR, "term"), (_SURFACE, "color"))
@@ -250,8 +250,9 @@ class CompactColoredIntensityUnit(CompactIntensityUnit):
     def _issue(self, m: Module, advance, surface: Signal) -> _Issue:
         """Take pixels in, and give their products one by one to the multiplier.
 
-        Each product of a channel has a bit: first the albedo, then the terms. With a single channel products
-        of 0 follow, which give its sum the time that it needs.
+        Each product of a channel has a bit in ``used``, ``left`` and ``after``: bit 0 is the albedo's, and
+        the terms' bits follow. If there is only one channel, products of 0 end its first pass, so that the
+        second pass finds its sum.
         """
         p, given = self.model, self.i.payload
         terms = [Value.cast(term) for kind in self.kinds for term in given[kind]]
@@ -270,7 +271,7 @@ class CompactColoredIntensityUnit(CompactIntensityUnit):
             Signal(name=name) for name in ("ends_channel", "ends_pass", "ends_pixel")
         )
 
-        # As in a `CompactIntensityUnit`.
+        # ``free`` and ``ready`` work as in a `CompactIntensityUnit`.
         free, ready = (Signal(name=name, init=1) for name in ("free", "ready"))
         following, last_channel = Signal(name="following"), p.channels - 1
         nonzero = [term.any() for term in terms]
