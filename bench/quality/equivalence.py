@@ -92,10 +92,10 @@ class Miter:
 
     A proof through multipliers would take too long. Therefore unit and mutant share their registers, and the
     proof shows that both compute the same next values. Then the registers stay equal by induction. Shared
-    registers of at most 12 bits, and registers named ``valid`` or ``ages``, control the unit. They take the
-    next values that the unit computes. The other shared registers are free inputs, or 0 if they are always 0
-    in the unit. The register that the fault reaches first is not shared. Bits that differ in a proof are not
-    shared in the next proof.
+    registers of at most 12 bits, and registers named ``valid`` or ``ages``, count as the control of the unit:
+    in the proof they take the next values that the unit computes. The other shared registers are free inputs,
+    or 0 if they are always 0 in the unit. The register that the fault reaches first is not shared. Bits that
+    differ in a proof are not shared in the next proof.
 
     Parameters
     ----------
@@ -160,8 +160,8 @@ class Miter:
         # registers this is rare.
         if not self._write(mutant, shared):
             return True
-        # The fault may have no effect for any contents of the registers. For example, it changes a register's
-        # input only while the register keeps its value.
+        # Perhaps the fault has no effect, whatever the registers contain. For example, it changes a
+        # register's input only while the register keeps its value.
         if self._prove(mutant, shared, _SECONDS / 4)[0]:
             return True
         if register:
