@@ -109,7 +109,8 @@ def load_mesh(
 
     The factors of glTF are linear, as k_d is. So they are used without conversion. ``Kd`` is used without
     conversion, too. If a material file is missing, or has no material of the name that is used, the colours
-    are ``None``. Materials that no face uses are left out, and equal materials are merged.
+    are ``None``. If a name is defined twice, the first definition counts. Materials that no face uses are
+    left out, and equal materials are merged.
 
     *Colours of other formats* are decoded by the curve of sRGB:
 

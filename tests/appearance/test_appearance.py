@@ -15,9 +15,11 @@ from blysk.golden.reference.reflection import REFLECTION_MODELS
 from blysk.golden.reference.renderer import render
 from blysk.golden.reference.transfer import encode
 
+from .formats import COLORED
 from .pictures import drawn
-from .samples import SAMPLES
+from .samples import SAMPLES as OF_GLTF
 
+SAMPLES = OF_GLTF | COLORED
 SIZE = 128, 96
 LOOK = {"projection": "orthographic", "view": (0.1, 0.2, 1), "background": (0.2, 0, 0.2)}
 SHIFTS = (0, 0), (0.0625, 0), (-0.0625, 0), (0, 0.0625), (0, -0.0625)
