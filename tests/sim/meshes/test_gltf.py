@@ -176,7 +176,7 @@ def test_instances(path, kind):
     [
         ({}, "no count of instances"),
         ({"TRANSLATION": -1}, "not a whole number of at least 0"),
-        ({"TRANSLATION": 9}, "there are 2"),
+        ({"TRANSLATION": 9}, "there are only 2"),
         ({"TRANSLATION": 1}, "not 3 finite numbers"),
     ],
 )
