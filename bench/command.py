@@ -1,66 +1,15 @@
-"""Shared parts of the commands: progress that can be interrupted, and the exit status."""
+"""Shared parts of the commands: work that can be interrupted, and the exit status."""
 
 import contextlib
-import io
 import sys
-import time
-from collections.abc import Callable, Iterable, Iterator, Sequence
-from typing import TypeVar
+from collections.abc import Callable, Iterator, Sequence
 
 import click
-from tqdm import tqdm
 
+from blysk.sim.cli.progress import progress
 from blysk.sim.errors import CompilerMissing, InputError, SimulationError
 
-__all__ = ["progress", "resumable", "run", "steps"]
-
-_SECONDS = 10
-"""Seconds between two lines of `progress` without a terminal."""
-
-Part = TypeVar("Part")
-
-
-class _Lines(tqdm):
-    """Progress without a terminal: a line on standard error every `_SECONDS`. Shorter work prints no line."""
-
-    def __init__(self, *arguments, **options):
-        self._printed = time.monotonic()
-        super().__init__(*arguments, file=io.StringIO(), ncols=0, **options)
-
-    def display(self, msg=None, pos=None):
-        """Print the state if the last line is old enough. The empty state at the end is not printed."""
-        if msg is None and time.monotonic() - self._printed >= _SECONDS:
-            self._printed = time.monotonic()
-            print(self, file=sys.stderr, flush=True)
-
-
-def progress(parts: Iterable[Part] | None = None, *, total: int, unit: str) -> "tqdm[Part]":
-    """Progress of long work: a bar on a terminal, else a line on standard error every 10 seconds.
-
-    Parameters
-    ----------
-    parts : iterable, optional
-        Parts of the work. The bar then iterates over them. Without parts, call ``update`` after each part.
-    total : int
-        Number of the parts.
-    unit : str
-        Name of the parts.
-    """
-    kind = tqdm if sys.stderr.isatty() else _Lines
-    return kind(parts, total=total, unit=f" {unit}", leave=False)
-
-
-@contextlib.contextmanager
-def steps() -> Iterator[Callable[[str], None]]:
-    """Show the steps of long work. Call the context's value with the name of each step.
-
-    On a terminal one line changes. Else each step is a line on standard error.
-    """
-    if sys.stderr.isatty():
-        with tqdm(bar_format="{desc}", leave=False) as bar:
-            yield bar.set_description_str
-    else:
-        yield lambda step: click.echo(f"blysk: {step}", err=True)
+__all__ = ["resumable", "run"]
 
 
 @contextlib.contextmanager

@@ -4,8 +4,8 @@ import os
 
 import click
 
-from blysk.bench.command import progress
 from blysk.bench.tools.defaults import SAMPLES, SEED
+from blysk.sim.cli.progress import progress
 from blysk.sim.output import check_writable, write_json
 from blysk.sim.value_types import OutputFile, Whole
 

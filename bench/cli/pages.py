@@ -4,9 +4,9 @@ from pathlib import Path
 
 import click
 
-from blysk.bench.command import progress
 from blysk.bench.tools.pages_folder import check_folder
 from blysk.bench.units.names import UNITS
+from blysk.sim.cli.progress import progress
 from blysk.sim.value_types import Choice
 
 __all__ = ["command"]

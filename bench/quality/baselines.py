@@ -18,8 +18,9 @@ from pathlib import Path
 
 import click
 
-from blysk.bench.command import progress, run
+from blysk.bench.command import run
 from blysk.bench.store import Task, results_of
+from blysk.sim.cli.progress import progress
 from blysk.sim.errors import InputError
 from blysk.sim.frames.workers import local_executor, processors
 from blysk.sim.output import check_writable, write_json

@@ -27,8 +27,9 @@ from dataclasses import asdict
 
 import click
 
-from blysk.bench.command import progress, run
+from blysk.bench.command import run
 from blysk.bench.units.names import UNITS
+from blysk.sim.cli.progress import progress
 from blysk.sim.engines.cache import version_of
 from blysk.sim.errors import InputError
 from blysk.sim.frames.workers import local_executor, processors

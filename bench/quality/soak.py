@@ -13,9 +13,10 @@ from collections.abc import Sequence
 
 import click
 
-from blysk.bench.command import progress, run
+from blysk.bench.command import run
 from blysk.bench.store import results_of
 from blysk.bench.units.names import UNITS
+from blysk.sim.cli.progress import progress
 from blysk.sim.engines.cache import version_of
 from blysk.sim.errors import InputError
 from blysk.sim.frames.workers import local_executor, processors

@@ -18,7 +18,8 @@ from collections.abc import Sequence
 
 import click
 
-from blysk.bench.command import run, steps
+from blysk.bench.command import run
+from blysk.sim.cli.progress import steps
 from blysk.sim.value_types import Size, Whole
 
 __all__ = ["TARGETS", "main"]

@@ -10,7 +10,8 @@ from collections.abc import Sequence
 
 import click
 
-from blysk.bench.command import run, steps
+from blysk.bench.command import run
+from blysk.sim.cli.progress import steps
 from blysk.sim.frames.workers import local_executor
 from blysk.sim.installation import install_extra
 from blysk.sim.value_types import Size, Whole

@@ -17,7 +17,6 @@ from typing import Any
 import click
 import numpy as np
 
-from blysk.bench.command import progress, steps
 from blysk.bench.tools.board_build import Built, build
 from blysk.bench.tools.board_design import BoardTop, gpu_of, least_cycles
 from blysk.bench.tools.boards import Board
@@ -31,6 +30,7 @@ from blysk.golden.video.clock_plan import ClockPlan, NoClockPlan, clock_plan
 from blysk.golden.video.draw_unit import turned
 from blysk.hdl.emit.processes import run_program
 from blysk.hdl.gpu import GpuUnit
+from blysk.sim.cli.progress import progress, steps
 from blysk.sim.engines.toggles import ToggleCounter
 from blysk.sim.errors import InputError, SimulationError
 from blysk.sim.frames.display import OneClock, Shown, show

@@ -27,7 +27,6 @@ from typing import Any
 import click
 from amaranth.lib import wiring
 
-from blysk.bench.command import progress
 from blysk.bench.tools.blocks import entries_shown
 from blysk.bench.tools.families import ECP5, Family, Parts
 from blysk.bench.tools.parts_by_unit import parts_by_unit, sum_parts
@@ -39,6 +38,7 @@ from blysk.golden.pipeline import ShadingPipeline
 from blysk.golden.presets import METHODS
 from blysk.hdl.bus.bus import core_of
 from blysk.sim.api.design import built, design
+from blysk.sim.cli.progress import progress
 from blysk.sim.errors import InputError, OptionError
 from blysk.sim.output import write_json
 

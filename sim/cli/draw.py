@@ -1,17 +1,16 @@
 """The work of ``blysk render``, after its options are checked."""
 
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager, nullcontext
 from functools import partial
 from pathlib import Path
 from time import perf_counter
 from typing import Any
 
-from tqdm import tqdm
-
 from blysk.sim.api.render import BUILDING, SPECIALISING, Rendering, prepare_rendering
 from blysk.sim.api.rendered_frame import RenderedFrame
 from blysk.sim.api.settings import Settings
+from blysk.sim.cli.progress import progress, steps
 from blysk.sim.errors import InputError
 from blysk.sim.frames.animation import Animation, dask_executor, process_executor, render_frames, write_gif
 from blysk.sim.frames.figures import animation_figures
@@ -58,14 +57,14 @@ def draw_frame(
     iterable of str
         The lines to be printed.
     """
-    with all_or_none(), _stages() as stage:
+    with all_or_none(), steps(late=True) as stage:
         engine = "pysim" if vcd else engine
         ready = prepare_rendering(settings, engine=engine, stage=partial(_show_stage, stage))
-        stage.set_description_str("rasterising and simulating")
+        stage("rasterising and simulating")
         frame = _frame(ready, vcd)
-        stage.set_description_str("comparing with the golden renderer")
+        stage("comparing with the golden renderer")
         report = frame.figures
-        stage.set_description_str("writing")
+        stage("writing")
         if output:
             frame.save(output)
         if comparison:
@@ -110,7 +109,7 @@ def draw_turntable(
         The lines to be printed.
     """
     drawn: list[str] = []
-    with _removed_on_failure(drawn), _stages() as stage:
+    with _removed_on_failure(drawn), steps(late=True) as stage:
         ready = prepare_rendering(
             settings,
             engine=engine,
@@ -118,9 +117,9 @@ def draw_turntable(
             remote=bool(address),
             stage=partial(_show_stage, stage),
         )
-        stage.set_description_str("rasterising and simulating")
+        stage("rasterising and simulating")
         report = _animation(ready, pictures, jobs, address, drawn)
-        stage.set_description_str("writing the animation")
+        stage("writing the animation")
         write_gif(gif, pictures)
         drawn.append(gif)
         report["seconds"]["animation"] = perf_counter() - start - sum(report["seconds"].values())
@@ -128,11 +127,6 @@ def draw_turntable(
         if figures:
             write_json(figures, report)
     return animation_lines(report)
-
-
-def _stages() -> tqdm:
-    """A line that shows the stage of the work."""
-    return tqdm(bar_format="{desc}", leave=False, disable=None)
 
 
 @contextmanager
@@ -146,9 +140,9 @@ def _removed_on_failure(files: Sequence[str]) -> Iterator[None]:
         raise
 
 
-def _show_stage(bar: tqdm, text: str) -> None:
+def _show_stage(show: Callable[[str], None], text: str) -> None:
     """Show a stage of the work. For a long stage also print a line, which says how long the stage takes."""
-    bar.set_description_str(text)
+    show(text)
     if text == SPECIALISING:
         print(_SPECIALISE, flush=True)
     elif text.startswith(BUILDING) and text != BUILDING:
@@ -159,7 +153,7 @@ def _frame(ready: Rendering, vcd: str | None) -> RenderedFrame:
     """Render the frame, with a progress bar."""
     with (
         atomic_writer(vcd) if vcd else nullcontext() as waves,
-        tqdm(unit=" pixels", unit_scale=True, delay=1, leave=False, disable=None) as bar,
+        progress(total=None, unit="pixels", scaled=True) as bar,
     ):
 
         def show(done: int, count: int) -> None:
@@ -183,7 +177,7 @@ def _animation(
         workers = process_executor(animation, min(jobs or processors(), len(cameras)))
     done = {}
     mesh = {"mesh": ready.loaded.name}
-    with workers as executor, tqdm(total=len(cameras), unit=" frames", leave=False, disable=None) as bar:
+    with workers as executor, progress(total=len(cameras), unit="frames") as bar:
         for index, frame in render_frames(executor, cameras):
             write_image(pictures[index], frame.image)
             drawn.append(pictures[index])

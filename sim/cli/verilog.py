@@ -81,13 +81,17 @@ def command(context, name, output, testbench, **_):
     # After the checks of options, because the hardware's description takes a second to import.
     from blysk.sim.api.bus_documents import documents_of
     from blysk.sim.api.verilog import header_of, verilog_and_unit
+    from blysk.sim.cli.progress import steps
     from blysk.sim.frames.testbench import check_folder, write_testbench
 
     if testbench is not None:
         if output and Path(os.path.realpath(output)).is_relative_to(os.path.realpath(testbench)):
             raise InputError(output, "lies in the folder of --testbench", "choose another file")
         check_folder(testbench)
-    text, unit = verilog_and_unit(made, name)
+    # Hardware geometry takes over ten seconds.
+    with steps(late=not build.takes_triangles) as show:
+        show(f"writing the Verilog of a core with top {build.top}")
+        text, unit = verilog_and_unit(made, name)
     with all_or_none():
         if output:
             write_text(output, text)

@@ -3,14 +3,12 @@
 import re
 import subprocess
 import sys
-import time
 from pathlib import Path
 
 import click
 import pytest
 
 import blysk.bench
-from blysk.bench import command
 from blysk.bench.command import run
 from blysk.sim.cli.main import main
 from blysk.sim.engines.engine import CompilerMissing, SimulationError
@@ -116,31 +114,6 @@ def test_help_and_refused_arguments_load_nothing_heavy(tmp_path):
     commands = "bench blocks board explore fpga pages render verilog web"
     assert done.stdout == f"{commands} {{0}} {{2}} set() {len(refused)}\n"
     assert [path.name for path in tmp_path.iterdir()] == ["file"]
-
-
-def test_progress_without_a_terminal_is_a_line_now_and_then(capsys, monkeypatch):
-    monkeypatch.setattr(command, "_SECONDS", 0.3)
-    for _ in command.progress(range(8), total=8, unit="parts"):
-        time.sleep(0.15)
-    output, errors = capsys.readouterr()
-    assert output == ""
-    lines = errors.splitlines()
-    assert 1 <= len(lines) <= 6
-    assert all(re.match(r" *\d+% \d/8 \[.* parts/s\]$", line) for line in lines)
-
-
-def test_steps_without_a_terminal_are_lines(capsys):
-    with command.steps() as show:
-        show("mapping")
-        show("placement 1")
-    assert capsys.readouterr() == ("", "blysk: mapping\nblysk: placement 1\n")
-
-
-def test_progress_of_short_work_says_nothing(capsys):
-    with command.progress(total=2, unit="parts") as bar:
-        bar.set_description_str("first")
-        bar.update(2)
-    assert capsys.readouterr() == ("", "")
 
 
 MODULES = """

@@ -16,6 +16,8 @@ from collections.abc import Callable
 from pathlib import Path
 from types import ModuleType
 
+from blysk.sim.cli.progress import steps
+
 PAGES = Path(__file__).parents[1]
 _NUMBER = re.compile(r"(-?[\d,]*\.?\d+)(e[+-]\d+)?(\D*)")
 _TABLE = re.compile(r"(<!-- table: ([\w-]+) -->\n).*?(<!-- end -->)", re.DOTALL)
@@ -102,10 +104,13 @@ def main() -> int:
     parser.add_argument("pages", nargs="*", help="pages, such as chord.md; all by default")
     chosen = parser.parse_args()
     wrong = []
-    for name, pages in MODULES.items():
-        if not chosen.pages or set(pages) & set(chosen.pages):
-            wrong += work(importlib.import_module(name), pages, chosen.check)
-    print(*wrong, sep="\n", file=sys.stderr)
+    with steps() as show:
+        for name, pages in MODULES.items():
+            if not chosen.pages or set(pages) & set(chosen.pages):
+                show(f"computing {', '.join(pages)}")
+                wrong += work(importlib.import_module(name), pages, chosen.check)
+    for line in wrong:
+        print(line, file=sys.stderr)
     return 1 if wrong else 0
 
 

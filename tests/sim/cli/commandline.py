@@ -9,7 +9,10 @@ from PIL import Image
 
 from blysk.golden.reference.lighting import Light, Material
 
-PROGRAM = [sys.executable, "-c", "import sys; from blysk.sim.cli.main import main; sys.exit(main())"]
+_MAIN = "import sys; from blysk.sim.cli import main, progress; progress.SECONDS = 3600; sys.exit(main.main())"
+
+PROGRAM = [sys.executable, "-c", _MAIN]
+"""The command. It shows no step, however busy the machine is."""
 
 SMALL = ["teapot", "--triangles", "500", "--size", "64x48"]
 

@@ -4,9 +4,16 @@ import re
 
 import pytest
 
+from blysk.sim.cli import progress
 from blysk.sim.cli.main import main
 
 from .commandline import files
+
+
+@pytest.fixture(autouse=True)
+def no_late_lines(monkeypatch):
+    """No line of progress, however busy the machine is."""
+    monkeypatch.setattr(progress, "SECONDS", 3600)
 
 
 @pytest.fixture

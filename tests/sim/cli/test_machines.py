@@ -11,6 +11,8 @@ from blysk.sim.cli import draw
 from blysk.sim.cli.main import main
 from blysk.sim.errors import InputError
 
+from .commandline import PROGRAM
+
 RENDER = ["render", "teapot", "--triangles", "64", "--size", "8x6", "--engine", "pysim"]
 WARNING = "models and tools are compiled again; set XDG_CACHE_HOME to a folder that can be written"
 PLACES = ("HOME", "XDG_CACHE_HOME", "BLYSK_CACHE", "YOWASP_CACHE_DIR", "TMPDIR", "COVERAGE_PROCESS_CONFIG")
@@ -21,8 +23,7 @@ pytestmark = pytest.mark.skipif(not Path("/proc/self").exists(), reason="/proc i
 def blysk(*arguments, folder, launcher=(), **places):
     """Status, output and lines of errors of a command in an environment with these folders."""
     environment = {name: value for name, value in os.environ.items() if name not in PLACES} | places
-    program = "import sys; from blysk.sim.cli.main import main; sys.exit(main())"
-    command = [*launcher, sys.executable, "-c", program, *map(str, arguments)]
+    command = [*launcher, *PROGRAM, *map(str, arguments)]
     done = subprocess.run(command, cwd=folder, env=environment, capture_output=True, text=True, timeout=300)
     assert "Traceback" not in done.stdout + done.stderr
     return done.returncode, done.stdout, done.stderr.splitlines()
@@ -137,7 +138,9 @@ def test_picture_waits_for_the_figures(tmp_path, monkeypatch, capsys):
 
 MEMORY = r"""
 import re, sys
+from blysk.sim.cli import progress
 from blysk.sim.cli.main import main
+progress.SECONDS = 3600
 status = main(sys.argv[1:])
 # The largest of getrusage counts the process that this one was started from.
 print(re.search(r"VmHWM:\s+(\d+)", open("/proc/self/status").read())[1])

@@ -28,6 +28,7 @@ from malformed import RENDER, Case, file_case, split
 
 import blysk.sim.api.render
 import blysk.sim.cli.main
+import blysk.sim.cli.progress
 from blysk.golden.frames.frame import model_frame
 from blysk.sim.frames.frame import SimulatedFrame
 from blysk.sim.value_types import OutputFile
@@ -159,6 +160,7 @@ def _attempt(case: Case, folder: Path, output: Path) -> None:
         used = sum(os.times()[:2])
         resource.setrlimit(resource.RLIMIT_CPU, (math.ceil(used) + SECONDS,) * 2)
         signal.alarm(PATIENCE)
+        blysk.sim.cli.progress.SECONDS = 3600
         status = blysk.sim.cli.main.main(case.arguments)
         sys.stdout.flush()
         (output / "memory").write_text(str(_memory("VmPeak") - begin))
