@@ -219,7 +219,7 @@ class TexelMemory:
         Raises
         ------
         ValueError
-            If they do not fit.
+            If the textures do not fit.
         """
         if not textures:
             raise ValueError("a texel memory needs a texture")

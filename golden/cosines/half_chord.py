@@ -22,7 +22,7 @@ class HalfChord:
     ``z = w/4`` is shifted by an even number of bits to ``v = z 4^j`` in [1/4, 1). ``s = sqrt(v)`` is read
     from a table of 512 words with linear interpolation. Then ``psi = 2^-(j+1) s g(z)`` with ``g(z) = 2
     arcsin(sqrt z)/(pi sqrt z) = 2/pi + z (c1 + z (c2 + z (c3 + z c4)))``. g is exact at angle 0 and fitted up
-    to 90 degrees. For larger angles the caller gives the squared chord to the opposite vector,
+    to 90 degrees. For angles over 90 degrees the caller gives the squared chord to the opposite vector,
     ``|N_r + N_l|^2``, and sets ``supplement``. The result is then half a turn minus the angle of this chord.
     So angles from 0 to 180 degrees are possible, and the result is well-conditioned at both ends.
 

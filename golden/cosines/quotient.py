@@ -11,7 +11,7 @@ from blysk.golden.number.fixed import SQ, UQ, Fixed, Format
 __all__ = ["OCTAVES", "STEPS", "Quotient", "place_format"]
 
 OCTAVES, STEPS = 15, 16
-"""Octaves of a part of a lobe's table, and steps of a row. A further row has all smaller numbers."""
+"""Octaves of a part of a lobe's table, and steps of a row. One more row has the numbers below all octaves."""
 
 FRACTION_BITS = 12
 """Bits of a place within a step."""
@@ -36,8 +36,8 @@ class Quotient:
     ``s = 1/2``. From there on the place is past the end. Without ``mirror`` it is past the end where ``z <
     0``.
 
-    *Row.* Octave ``[2^-(j+1), 2^-j)`` with j = 0 to 14 is row 15 - j. All smaller numbers are row 0, with
-    equal steps.
+    *Row.* Octave ``[2^-(j+1), 2^-j)`` with j = 0 to 14 is row 15 - j. The numbers below all octaves are row
+    0, with equal steps.
 
     ============ =========== =====================================================================
     word         format      why

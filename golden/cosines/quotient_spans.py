@@ -111,7 +111,7 @@ class QuotientWords(NamedTuple):
     Parameters
     ----------
     squares : tuple of three arrays, shape (spans, lights + 1)
-        ``m`` of each light, and ``w`` last. Without highlights ``w`` alone.
+        ``m`` of each light, and ``w`` last. If there are no highlights, only ``w``.
     lines : tuple of two arrays, shape (spans, lights)
         l of each light. l has no second difference.
     heights : tuple of two arrays, shape (spans, lights)
@@ -197,7 +197,8 @@ class QuotientSpans:
         """Names of the components of a vector, in order.
 
         ``x0, y0, z0, x1, y1, z1, ...`` by light; with ``mirror`` y is ``y cos a``, and ``y sin a`` of the
-        first light comes last, as ``s0``. Without highlights ``x0, y0, z0, z1, z2, ...``: z along each light.
+        first light comes last, as ``s0``. If there are no highlights, the names are ``x0, y0, z0, z1, z2,
+        ...``: z along each light.
         """
         if not self.highlights:
             return ("x0", "y0", *(f"z{light}" for light in range(self.lights)))

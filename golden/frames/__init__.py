@@ -1,1 +1,1 @@
-"""Frames: spans prepared for a pipeline, its bit-accurate pixels, and their errors."""
+"""Frames: spans prepared for a pipeline, the bit-accurate pixels, and the errors of the pixels."""

@@ -15,7 +15,7 @@ __all__ = ["BORDER", "border_mask", "border_name", "highlight_step"]
 BORDER = 0.002
 """Largest ``|N·L|`` of a pixel at the border of a light, where rounding may switch the light on or off.
 
-Also the largest distance, in texels, of a pixel at the border of a texel.
+A pixel at the border of a texel is at most this distance, in texels, from another texel.
 """
 
 # Number of fragments processed together; it limits the memory.

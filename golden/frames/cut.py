@@ -346,8 +346,8 @@ def cut_by_error(
       `LocalChordInterpolator` at any pixel. Here every pixel is checked.
 
     The tolerance of u depends on the exponent of the span's material. It also depends on the least u of the
-    span, because dark spans may have larger errors. If a light is behind the surface along the whole span,
-    only the angle of the span counts. A light that is off has no effect.
+    span, because dark spans may have larger errors than bright spans. If a light is behind the surface along
+    the whole span, only the angle of the span counts. A light that is off has no effect.
 
     Parameters
     ----------

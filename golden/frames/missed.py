@@ -46,7 +46,7 @@ def _missed(
     limits: HighlightLimits | None,
     turn: np.ndarray,
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Spans that are off by more than the tolerances, by the method's curve or by their words.
+    """Spans that are off by more than the tolerances, through the method's curve or their normals' words.
 
     A normal that is turned by e has errors of at most e for N·L and ``sqrt(2u) e + e^2/2`` for u, as
     ``|N - H| = sqrt(2u)``. The signs of N·L are ignored.

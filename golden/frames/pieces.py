@@ -1,4 +1,4 @@
-"""Pieces of spans, and the distance of a method's curve from the exact values along them."""
+"""Pieces of spans, and the distance of a method's curve from the exact values along a piece."""
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace

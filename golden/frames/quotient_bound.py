@@ -133,7 +133,7 @@ def triangle_light_errors(scene: Scene, renderer: Renderer, sent: SceneTriangles
     steps = np.ldexp(2.0**17 * (1 - 2.0**-adapter.margin_shift), adapter.shift(pieces))
     last = pieces.length - 1.0
     difference = np.abs(right - left).max(axis=1) * steps
-    # Error of the step and of its dropped bits. If the step is turned, its word is a bit shorter.
+    # Error of the step and of its dropped bits. A step that is turned is shifted by one place less.
     of_step = np.maximum(difference * 2.0**-17, 1 / 16) * (1 + adapter.rotates)
     rounding = np.where(last > 0, of_step + 1 / 8, 0)
     across = across_slivers(drawn, drawn.triangles.normal, renderer)

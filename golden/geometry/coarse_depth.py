@@ -22,12 +22,12 @@ class CoarseDepth:
     """Bounds of the depths in blocks of pixels. A span behind the bounds of all its blocks is hidden.
 
     A block has a bound b, a candidate c and a mask. No depth that `DepthTester` has stored in the block is
-    deeper than b. Depth is linear, so a span's pixels in the block lie between two depths ``lo`` and ``hi``,
-    at their ends.
+    deeper than b. Depth is linear. So the depths of a span's pixels in the block lie between the depths of
+    the first and the last of these pixels: ``lo``, the smaller depth, and ``hi``, the larger depth.
 
-    - If ``lo > b``, they are hidden.
-    - If ``hi < b``, they are marked in the mask, and c becomes the larger of c and ``hi``. When all pixels of
-      the block are marked, c is the new b and the mask is empty.
+    - If ``lo > b``, these pixels are hidden.
+    - If ``hi < b``, these pixels are marked in the mask, and c becomes the larger of c and ``hi``. When all
+      pixels of the block are marked, c is the new b and the mask is empty.
 
     Depths are compared by their upper bits: of two depths with different upper bits the larger is deeper. So
     the test may keep a hidden span, but it never drops a visible span. A part of a span behind the bound of

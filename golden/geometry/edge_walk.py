@@ -55,7 +55,7 @@ class Rows:
 
 @dataclass(frozen=True)
 class EdgeWalk:
-    """Walks the long edge of a triangle, and beside it first the upper edge, then the lower edge.
+    """Walks the long edge of a triangle, and at the same time first the upper, then the lower edge.
 
     A triangle is convex. On a scanline between its first and its last corner it reaches from the long edge to
     the short edge that crosses the scanline. The third edge lies above or below the scanline. So these two

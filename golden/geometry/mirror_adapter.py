@@ -22,7 +22,7 @@ class MirrorAdapter:
     one pixel the step has no meaning, and gets the products of the start.
 
     The codes are off by 2^-18, and both have the scale `QuotientSpans.ONE`. So y and a are off by less than
-    2^-16 of themselves, and gamma by less than 2^-15. A product is rounded by half a step, beside the error
+    2^-16 of themselves, and gamma by less than 2^-15. A product is rounded by half a step, besides the error
     of y.
 
     Source: docs/theory/geometry.md#normals; not in the documents.

@@ -204,7 +204,7 @@ def _surface_of(scene: Scene, surface: AttributeSpans) -> np.ndarray:
 def _placed(
     scene: Scene, source: np.ndarray, records: np.ndarray
 ) -> tuple[dict[str, np.ndarray], np.ndarray, np.ndarray]:
-    """Placement of texture coordinates, levels of faces, and their spread, see `triangle_levels`.
+    """Placement of texture coordinates; levels of faces, and spread of each triangle, see `triangle_levels`.
 
     In ``records`` attributes from -1 to 1 replace the texture coordinates.
     """

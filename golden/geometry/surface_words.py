@@ -14,9 +14,9 @@ __all__ = ["SurfaceWords"]
 class SurfaceWords:
     """Makes words of `AttributeSpans` from the planes of a triangle, by shifts and cuts.
 
-    The attributes of a surface are further planes of a triangle, beside N/W and the depth. A corner has ``U =
-    A s`` of each colour and texture coordinate A, and then s. s is 1/W over the largest 1/W of the triangle,
-    times `LARGEST`. Orthographic triangles have ``s = LARGEST``. A texture coordinate A is ``(texel
+    The attributes of a surface are further planes of a triangle, besides N/W and the depth. A corner has ``U
+    = A s`` of each colour and texture coordinate A, and then s. s is 1/W over the largest 1/W of the
+    triangle, times `LARGEST`. Orthographic triangles have ``s = LARGEST``. A texture coordinate A is ``(texel
     - base)/2^range``, from -1 to 1. Software chooses base, range and level of each triangle.
 
     ========== ============ =====================================================================
@@ -35,7 +35,7 @@ class SurfaceWords:
     The error of a plane is under ``1.1 2^-11`` in every triangle of the grid (`GradientSetup.error`). So no
     word of a covered pixel reaches 1. The dropped bits of the start and the last rounding add 3/2 steps of
     2^-23. The dropped bits of a step add ``i 2^-e`` steps at pixel i. If one more place did not fit, a step
-    is over ``2^-(e + 1)``, and ``i 2^-e`` is under 4. So a word is off by `ERROR` at most, beside the error
+    is over ``2^-(e + 1)``, and ``i 2^-e`` is under 4. So a word is off by `ERROR` at most, besides the error
     of the planes.
 
     Source: docs/theory/geometry.md#surface; not in the documents.

@@ -85,11 +85,12 @@ class VectorAdapter:
     ----------
     rotates : bool
         Whether vectors will be turned into other frames. Then the lengths of the vectors and of their steps
-        have to be under 1, not only their components. If the shift and e are not 0, they are one less. N/W
-        may be at most 1 long, as `scene_triangles` makes it, and `SpanHalver` with ``rotates`` cuts spans. A
-        start keeps its rounding if the shift is 0. Else the rounding is twice as large for its length. The
-        rounding of the step is an eighth of a step, or `ERROR` times twice the distance of the ends. The
-        errors of both add up, so the margin is 2^-12, 32 steps of 2^-17.
+        have to be under 1, not only their components. A shift s over 0 is one less than for vectors that
+        are not turned. An e over 0 is one less, too. N/W may be at most 1 long, as `scene_triangles` makes
+        it, and `SpanHalver` with ``rotates`` cuts spans. A start keeps its rounding if the shift is 0. Else
+        its rounding is twice as large, relative to its length. The rounding of the step is an eighth of a
+        step, or `ERROR` times twice the distance of the ends. The errors of both add up, so the margin is
+        2^-12, 32 steps of 2^-17.
 
     Source: docs/theory/geometry.md#composition; not in the documents.
     """

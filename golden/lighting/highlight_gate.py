@@ -149,7 +149,7 @@ class HighlightGate(Gate):
         """T from the largest arguments with a term over 0, in steps of 2^-25; see also `LobeTable`."""
         nearest = (np.asarray(last_lit_arguments) + 1) * 2.0**-25
         level = float(ONE_SQUARED.values) - (nearest + self.margin) / self.limits.shortest
-        # T is in steps of 2^-34. It is one step less, because the quotient is not exact.
+        # The level is in steps of 2^-34. A step is subtracted, because the level's quotient is not exact.
         steps = np.floor(level * 2.0**34).astype(np.int64) - 1
         # Squares of 34 bits outgrow an int64.
         codes = [max(code, 0) ** 2 >> (68 - self.fraction_bits) for code in steps.tolist()]
@@ -163,7 +163,7 @@ class HighlightGate(Gate):
         a, b : Fixed, any shape, UQ(0, F)
             N·H at the ends, rounded up.
         u : Fixed, same shape, UQ(-1, F+1)
-            One minus the cosine of the angle between them, rounded up.
+            One minus the cosine of the angle between the normals at the ends, rounded up.
         threshold : Fixed, same shape, UQ(0, F)
             T.
 

@@ -81,8 +81,8 @@ class Lobe(HighlightOperand):
 
     *Loading.* A write of 18 bits loads an entry. Entries come in order, and the unit computes the differences
     (`LobeTable.writes`). A table takes (E + 1) M + 2 writes, 338 by default. Words of 35 bits would take
-    twice as many. Several *banks* hold a table each for several materials, so a change of the material takes
-    no write. The word at address ``(bank (E + 1) + row) M + step`` belongs to a bank.
+    twice as many writes. Several *banks* hold a table each for several materials, so a change of the material
+    takes no write. The word at address ``(bank (E + 1) + row) M + step`` belongs to a bank.
 
     Parameters
     ----------

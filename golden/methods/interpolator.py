@@ -352,7 +352,7 @@ class Interpolator(ABC):
         """The spans of a frame, cut for the method, and the number of given spans that were cut."""
 
     def least_cut(self, cutter: SpanCutter) -> Raster:
-        """The spans of a frame with as few cuts as the method's hardware can take, whatever their errors."""
+        """The spans of a frame with as few cuts as the method's hardware can take, whatever the errors."""
         return cutter.uncut()
 
     def missed(self, cutter: SpanCutter, cut: Raster) -> int:

@@ -336,7 +336,7 @@ class LocalChordInterpolator(Interpolator):
     def highlight_tolerance(self, exponent: np.ndarray, u: np.ndarray) -> np.ndarray:
         """Largest error of u that keeps `HIGHLIGHT_BUDGET`, for this u and every larger u.
 
-        The slope ``|dS/du|`` of a term is about n at the peak, and smaller farther off. It is
+        The slope ``|dS/du|`` of a term is about n at the peak, and smaller away from the peak. It is
         ``n (1 - n u/2)`` for the cosine-quadratic term, ``n (1 - u)^(n-1)`` for Blinn's power. With
         ``x = (n - 1) u`` both are at most ``n / (1 + x/2 + x^2/4 + x^3/8)``. Slopes of the pipeline's other
         models are at most 1.25 times this bound, and 1.6 times for n = 1.
@@ -357,7 +357,7 @@ class LocalChordInterpolator(Interpolator):
         """Whether a highlight may be over a quarter of an LSB, for this u or any larger u.
 
         Blinn's power is at most ``e^-x`` with ``x = (n - 1) u``. From ``x = 7`` on this is under a quarter of
-        an LSB. The other models reach 0 earlier, or decrease as fast.
+        an LSB. The other models reach 0 at a smaller x, or decrease as fast as Blinn's power.
 
         Parameters
         ----------

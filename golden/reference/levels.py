@@ -48,7 +48,7 @@ def triangle_levels(
     """Level of each face, for hardware that takes the level of a texture with a triangle.
 
     It is the level of the largest texel step at the mean of the corners in space, see `span_levels`. A face
-    in several pieces has the level of the mean of their steps.
+    in several pieces has the level of the mean of the pieces' steps.
 
     Parameters
     ----------
@@ -117,7 +117,7 @@ def texel_places(
 
 def _steps(corners: np.ndarray, ends: Sequence[np.ndarray], slopes: Sequence[np.ndarray]) -> np.ndarray:
     """Largest derivatives of u and v over places and directions, shape (spans, 2)."""
-    # A whole number of tiles away, coordinates have the same derivative with a larger rounding.
+    # Coordinates count from the first corner. Far from 0 the derivative is equal, with a larger rounding.
     corners = corners - corners[:, :1]
     step = np.zeros((len(corners), 2))
     for weights in ends:

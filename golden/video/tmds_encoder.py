@@ -12,7 +12,7 @@ BITS = 10
 CONTROL_WORDS = (0b1101010100, 0b0010101011, 0b0101010100, 0b1010101011)
 """Words outside the picture, by ``c0 + 2 c1`` of the control bits c0 and c1.
 
-Unlike words of colour they have seven transitions or more.
+They have seven transitions or more. Words of colour have fewer.
 """
 
 CLOCK_WORD = 0b1111100000

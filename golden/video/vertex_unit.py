@@ -56,7 +56,7 @@ class ScreenVertices:
     normal : int64 array, shape (V, 3)
         N/W, codes of `ATTRIBUTE`.
     outside : bool array, shape (V,)
-        Whether the vertex is nearer than the near plane, beside the grid, or at least `VertexTransform.FAR`
+        Whether the vertex is nearer than the near plane, outside the grid, or at least `VertexTransform.FAR`
         times as far as the near plane. Its other words are then invalid.
     """
 
