@@ -100,11 +100,11 @@ class FrameConstantsUnit(wiring.Component):
     ======================== ==========================================================
 
     A constant has its value 2 cycles after its write was accepted. With several materials the exponent and
-    the colours are in memories, one for each word. They are written for the material whose index was last
-    written to address 4. They are read for ``material``: 1 cycle after ``material`` changes, and 3 cycles
-    after a write. All 18 bits of an index count. Writes for an index past the last material are lost. A write
-    of a bank past the last bank is lost, too. A unit of one material has no index, and address 4 changes
-    nothing. Reset does not clear memories.
+    the colours are in memories, one for each word. The memories are written for the material whose index was
+    last written to address 4. They are read for ``material``: 1 cycle after ``material`` changes, and 3
+    cycles after a write. All 18 bits of an index count. Writes for an index past the last material are lost.
+    A write of a bank past the last bank is lost, too. A unit of one material has no index, and address 4
+    changes nothing. Reset does not clear memories.
 
     Parameters
     ----------

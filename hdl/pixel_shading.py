@@ -22,7 +22,8 @@ __all__ = ["COMPACT_INTERVAL", "PixelShading"]
 COMPACT_INTERVAL = 3
 """Least cycles of a pixel in the compact style, also with one channel.
 
-The products of a pixel share multipliers for these cycles. Three channels need at least as many cycles.
+The products of a pixel share multipliers for these cycles. Three channels need at least this number of
+cycles.
 """
 
 

@@ -21,7 +21,10 @@ from blysk.hdl.core.views import copy, copy_fields
 __all__ = ["AlbedoUnit"]
 
 _WAITING = 32
-"""Room for vertex colours that wait for their texels. A sample in a memory inside takes fewer cycles."""
+"""Room for vertex colours that wait for their texels.
+
+If the memory is inside, a sample takes fewer cycles than this number.
+"""
 
 
 class _ColorProductUnit(PipelinedUnit):

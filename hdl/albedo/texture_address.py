@@ -120,7 +120,7 @@ class TextureAddressUnit(PipelinedUnit):
             return Mux(level.any(), self._behind | size, 0)[:bits]
 
         def sum_of(width, height):
-            # Only levels behind level 0 use this sum, and theirs fits these bits.
+            # Only levels behind level 0 use this sum. Their sums fit these bits.
             return (_less_one(width) + _less_one(height))[: (bits - 1).bit_length()]
 
         exponent = g.register("exponent", sum_of, *sizes, formula="log2 S")

@@ -15,7 +15,7 @@ __all__ = ["dot", "shared_sums"]
 def shared_sums(graph: Dataflow, product: Format) -> FunctionalUnit:
     """Shared adders for the three products of a dot product. Each product has the format ``product``.
 
-    They take two cycles; see `dot`.
+    The adders take two cycles; see `dot`.
     """
     shapes = FixedShape(product + product), FixedShape(product)
     return graph.share("sum", shapes, 1, lambda register, x, y: register(x + y, "total"))

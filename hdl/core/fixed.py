@@ -241,7 +241,7 @@ class FixedValue(ValueCastable):
         negative = self._code[-1] if self.format.signed else Const(0)
         if format.signed:
             # The value is in range if all bits from the target's sign bit upwards are equal. If the value is
-            # unsigned, they must be 0.
+            # unsigned, these bits must be 0.
             above = self._code[format.width - 1 :]
             fits = ~above.any() | (above.all() if self.format.signed else 0)
             end = Cat((~negative).replicate(format.width - 1), negative)

@@ -276,7 +276,7 @@ def _delayed(
         fixed = operation.resource is not None or not operation.latency or operation in bound
         if fixed or not readers[operation] or not operation.operands:
             continue
-        # Wiring has the stage of its operand. So operations beside wiring do not move.
+        # Wiring has the stage of its operand. So operations before or behind wiring do not move.
         if any(not o.latency and o.operands for o in (*readers[operation], *operation.operands)):
             continue
         latest = min(placements[o].read for o in readers[operation]) - operation.latency

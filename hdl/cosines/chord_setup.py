@@ -108,7 +108,7 @@ class ChordSetupUnit(PipelinedUnit):
     Members
     -------
     i : :py:`In(stream.Signature(StructLayout({"values": span_values_shape(...), "length": length_bits})))`
-        Spans of length 1 or more. With factors also ``factors``, `span_factors_shape`.
+        Spans of length 1 or more. If lights fade, there is also ``factors``, `span_factors_shape`.
     o : :py:`Out(stream.Signature(chord_differences_shape(lights, highlights, model, factors)))`
         Differences. ``out_of_range``: P or G outgrows its word, and the differences are invalid.
 

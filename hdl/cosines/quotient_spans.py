@@ -114,7 +114,7 @@ class QuotientSpansUnit(wiring.Component):
 
     @property
     def _products(self) -> int:
-        """Products of a turn of the serial setup. Without highlights lines have products with a constant."""
+        """Products of a turn of the serial setup. Without highlights the lines have a constant factor."""
         p = self.model
         return sum(len(names) for names in p.squares) + p.lights * (2 if p.highlights else 1)
 
@@ -250,7 +250,7 @@ class QuotientSpansUnit(wiring.Component):
         def product(a, b, name):
             return register(register(a, f"{name}_a") * register(b, f"{name}_b"), name)
 
-        # The kind of word in each stage. Each of the three kinds has a bit.
+        # For each stage three signals tell the kind of its word: second difference, first difference, start.
         here = [[self.i.valid & turn for turn in (is_second, begun & ~is_second, ~begun)]]
         for stage in range(1, self._SHIFTED):
             held = [Signal(name=f"{name}_at_{stage}") for name in ("second", "first", "start")]

@@ -79,7 +79,7 @@ def emit(
 
     Verilator (``-Wall``), Icarus Verilog (``-g2001 -Wall``) and Yosys read the text without a warning.
     The text switches off Verilator's warnings about the style of generated netlists, by name and with the
-    reason. Its end restores them.
+    reason. The end of the text restores the former state of these warnings.
 
     The same component, header and descriptions give the same text.
 

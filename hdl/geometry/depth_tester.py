@@ -84,8 +84,8 @@ class DepthTesterUnit(wiring.Component):
 
     The initiation interval is 1. The latency of a drawn pixel, `latency`, is 3 cycles. With a memory outside
     of the unit, words come through a register, and the latency is 4. A pixel is also compared with the pixels
-    of the last two or three cycles at the same place. They are not in the memory yet. The unit has no
-    multipliers.
+    of the last two or three cycles at the same place. These earlier pixels are not in the memory yet. The
+    unit has no multipliers.
 
     With ``clears`` the unit writes `DepthTester.CLEARED` to each place of the picture, one a cycle. It does
     so when the first pixel comes after a reset, and after each change of ``picture.number``. Pixels wait

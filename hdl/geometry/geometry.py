@@ -210,8 +210,8 @@ class GeometryUnit(wiring.Component):
     i : :py:`In(stream.Signature(triangle_shape(grid, model.surface)))`
         Triangles.
     o : :py:`Out(stream.Signature(true_spans_shape()))`
-        Spans of the triangles. With ``lines`` in `line_spans_shape`, with ``vectors`` in
-        `vector_spans_shape`.
+        Spans of the triangles. Their shape is `line_spans_shape` with ``lines``, and
+        `vector_spans_shape` with ``vectors``.
     constants : :py:`In(frame_shape())`
         The frame, constant while triangles are inside.
     status : :py:`Out(counters_shape(*COUNTERS))`

@@ -28,7 +28,7 @@ def with_components(shape: data.StructLayout, components: int) -> data.StructLay
 
 
 class LightAdapterUnit(wiring.Component):
-    """Components of vectors for further lights, beside the first light's. `LightAdapter` is the model.
+    """Components of vectors for the lights after the first light. `LightAdapter` is the model.
 
     Each component of start and step has a multiplier. It takes x, y and z in turns, and the products are
     added. So the initiation interval is 3. In the *serial* form one multiplier makes all components one after

@@ -112,7 +112,7 @@ class PlaneSetupUnit(PipelinedUnit):
         shifter = g.share("shifter", (unsigned(bits),), 3, normalise)
         top = g.use(shifter, "height_moved", (height,), lambda h: (Cat(Const(0, grid.bits), h),))
         wide = g.use(shifter, "area_moved", (area,), lambda a: (a,))
-        # The shifter holds a result for one cycle only. A register keeps it, because it is needed for longer.
+        # The shifter holds a result for one cycle only. A register keeps the result for more cycles.
         top, wide = (g.register(f"{w.name}_kept", lambda v: v, w) for w in (top, wide))
 
         def mantissa(view):

@@ -19,8 +19,8 @@ _BITS = GradientSetup.FORMAT.width
 class AttributeTurns:
     """Control of the turns of ``count`` attributes: all on one cycle, or *serially* in as many turns.
 
-    In the serial form the first attribute decides for all of them whether a scanline comes in. The control of
-    the walk moves on with the last attribute, `ends`. With ``ahead`` registers tell whether the walk
+    In the serial form the first attribute decides for all attributes whether a scanline comes in. The control
+    of the walk moves on with the last attribute, `ends`. If ``ahead`` is set, registers tell whether the walk
     advances.
     """
 

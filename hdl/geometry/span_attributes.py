@@ -44,7 +44,7 @@ def planes_rows_shape(serial: bool = False, surface: AttributeSpans | None = Non
 
 
 def span_words_shape() -> dict:
-    """Members of a piece beside its normals."""
+    """Members of a piece except its normals."""
     words = {name: unsigned(PIXEL_BITS) for name in ("x", "y", "length")}
     depth = {"depth": FixedShape(SPAN_DEPTH), "depth_last": FixedShape(SPAN_DEPTH)}
     rest = {"depth_step": FixedShape(DEPTH_STEP), "flip": unsigned(1), "material": unsigned(MATERIAL_BITS)}
@@ -86,7 +86,7 @@ class SpanAttributesUnit(wiring.Component):
     and n. `latency` is 6, counted from the fourth time. A piece also waits until the piece before it has been
     taken.
 
-    With ``whole`` spans are not cut. They leave as the walk finds them, a cycle earlier: `latency` is 2. In
+    If ``whole`` is set, spans are not cut. They leave as the walk finds them, and `latency` is 2. In
     the serial form they leave attribute by attribute. The first attribute is offered `latency` cycles, 3,
     after its scanline came for the first time.
 
@@ -105,7 +105,7 @@ class SpanAttributesUnit(wiring.Component):
         Scanlines. The planes are read with the first scanline of a triangle. This is the first of all
         scanlines, or the scanline after a scanline with ``last``.
     o : :py:`Out(stream.Signature(pieces_shape()))`
-        Pieces. With ``whole`` these are spans in `whole_spans_shape`, if serial in `whole_span_shape`.
+        Pieces, or whole spans in `whole_spans_shape` (if serial, in `whole_span_shape`).
     status : :py:`Out(counters_shape("empty", "cut"))`
         Number of triangles without a span, and number of spans of more than one piece, since the reset. With
         ``whole`` only the number of triangles.

@@ -30,7 +30,7 @@ _WORD_BITS = SurfaceWords.FORMAT.width
 
 
 def surface_count(surface: AttributeSpans | None) -> int:
-    """Number of planes beside N/W and the depth."""
+    """Number of planes besides N/W and the depth."""
     return 0 if surface is None else surface.attributes + 1
 
 

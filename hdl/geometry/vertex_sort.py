@@ -139,7 +139,8 @@ class VertexSortUnit(wiring.Component):
     def _exchange(self, m: Module, corners: list, odd: Signal, step: Signal, takes: Value) -> list[Signal]:
         """Take corners in, and exchange neighbours that are in the wrong order.
 
-        Returns the comparisons of `_PAIRS`. On the second cycle they compare the corners in the given order.
+        Returns the comparisons of `_PAIRS`. On the second cycle these are the comparisons of the corners in
+        the given order.
 
         Corners 0 and 1 are exchanged first, then 1 and 2, then 0 and 1 again. All three pairs are compared on
         the first cycle, before any exchange. The exchanges so far decide which comparison the next exchange

@@ -106,7 +106,7 @@ class ColoredIntensityUnit(IntensityUnit):
         return register(m, register(m, surface * factor, f"colored_{name}") + beside, f"sum_{name}")
 
     def _by_tint(self, m, operands, light: FixedValue, channel: int, name: str):
-        """Light on the surface, and light beside it. ``tinted`` decides which gets the specular sum."""
+        """Light that the albedo multiplies, and other light. ``tinted`` places the specular sum."""
         register, tinted = self.register, self.constants.tinted
         products = self.products(m, operands, ("specular",), channel, name)
         levels = self.model.lights.bit_length()

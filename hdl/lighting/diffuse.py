@@ -13,9 +13,9 @@ class DiffuseUnit(PipelinedUnit):
 
     The term is ``max(N . L, 0)``, rounded half up to ``UQ(0, 17)`` and saturated. The latency is ``latency``
     cycles: one for rounding, one for saturation, and a delay for the rest. If the initiation interval is over
-    1, one more cycle takes the operand in. With the delay the term leaves together with the term of a longer
-    unit beside this unit. If the interval is 1, the delay is a memory of look-up tables. Else it is a
-    register for each interval. The unit has no multipliers.
+    1, one more cycle takes the operand in. With the delay the term leaves together with the term of a unit
+    that works on the same beat and takes more cycles. If the interval is 1, the delay is a memory of look-up
+    tables. Else it is a register for each interval. The unit has no multipliers.
 
     Parameters
     ----------

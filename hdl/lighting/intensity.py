@@ -223,7 +223,7 @@ class CompactIntensityUnit(wiring.Component):
         issued, multiplied, added, rounding = notes
         valid = Signal()
         last_channel = self.model.channels - 1
-        # Without reset a multiplier's own registers can take their place.
+        # These registers have no reset, so that synthesis can use a multiplier's own registers for them.
         factors = [
             Signal(FixedShape(of), name=name, reset_less=True)
             for of, name in ((_TERM, "term"), (_COLOR, "color"))

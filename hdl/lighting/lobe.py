@@ -103,7 +103,7 @@ class LobeMemory(wiring.Component):
         return m
 
     def _write(self, m: Module, port: Any) -> None:
-        """With each value but the first write a word: the value before, and the difference to this value."""
+        """Write a word with each value but the first: the value before, and its difference to this value."""
         p, write = self.model, self.write.payload
         value, previous = (Signal.like(write.value, name=name) for name in ("value", "previous"))
         address, last = (Signal.like(port.addr, name=name) for name in ("address", "last"))

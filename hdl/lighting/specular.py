@@ -85,7 +85,7 @@ class SlopeUnit(wiring.Component):
             a, b = (FixedValue.constant(term.format, term.values.item()) for term in p.slope_terms)
             code = Signal(p.SLOPE_FORMAT.width, name="slope_word", reset_less=True)
             m.d.sync += code.eq(((a * exponent).truncate(18) + b).wrap(p.SLOPE_FORMAT).as_value())
-        # Without a reset, a multiplier's own register can take the place of this register.
+        # This register has no reset, so that synthesis can use a multiplier's own register for it.
         scale = Signal(FixedShape(p.SCALE_FORMAT), name="scale", reset_less=True)
         shift = Signal(_SHIFT_BITS, name="shift", reset_less=True)
         for s in range(-1, 10):

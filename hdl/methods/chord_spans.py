@@ -49,8 +49,8 @@ class ChordAccumulatorUnit(AccumulatorUnit):
     i : :py:`In(stream.Signature(StructLayout({"length": 12})))`
         Lengths of spans, 1 or more.
     words : :py:`In(StructLayout({"start": ..., "lights": ...}))`
-        First values of the span that is taken in, and its differences. With factors also ``factor_start`` and
-        ``factors``.
+        First values of the span that is taken in, and its differences. If lights fade, there are also
+        ``factor_start`` and ``factors``.
     taken : :py:`Out(1)`
         High on the cycle on which the words of the accepted span are taken in.
     o : :py:`Out(stream.Signature(operands_shape(model, lights, highlights=highlights, ...)))`

@@ -92,7 +92,7 @@ class QuadraticInterpolatorUnit(NormalInterpolatorUnit, model=QuadraticInterpola
             gpq.i.valid.eq(middle.o.valid),
             middle.o.ready.eq(gpq.i.ready),
             # A length comes before its coefficients. Both start on the same cycle, and the coefficients take
-            # longer.
+            # more cycles than the length.
             *copy_fields(curve.i.payload, gpq.o.payload, "gpq"),
             curve.i.payload.length.eq(length.payload),
             curve.i.valid.eq(gpq.o.valid),

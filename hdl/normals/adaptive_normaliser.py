@@ -81,7 +81,8 @@ class AdaptiveNormaliserUnit(wiring.Component):
     def preparation(self, levels: int) -> int:
         """Cycles from a span to its first normal, if the span has at least ``2^levels + 1`` pixels.
 
-        A span of one pixel takes 50 cycles. Its single segment takes one cycle more through the FIFO.
+        A span of one pixel takes 50 cycles. Its single segment takes one cycle more through the FIFO than
+        the segments of longer spans.
         """
         return self.counting(levels) + 2 + SEGMENT_CYCLES * ((1 << levels) + 1)
 

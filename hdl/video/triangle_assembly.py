@@ -31,7 +31,7 @@ class TriangleAssemblyUnit(wiring.Component):
 
     A triangle takes three cycles, one for each corner that is read, even if the triangle is not sent. It is
     offered `latency` cycles after its first corner's address. A range is accepted while no other range is
-    read. Each range costs two more cycles. The unit has no multipliers.
+    read. Each range costs two cycles besides the cycles of its triangles. The unit has no multipliers.
 
     Parameters
     ----------
