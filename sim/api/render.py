@@ -221,7 +221,7 @@ def _fitted(design: ShadingPipeline, scene: Scene, settings: Settings) -> Shadin
 
 
 def _large(design: ShadingPipeline) -> str:
-    """Text with the large counts of a design, with which a first build takes long. Empty without them."""
+    """Text with the counts of lights and materials that make a first build slow. Empty if they are small."""
     counts = ("lights", design.lights), ("materials", design.materials)
     many = ", ".join(f"{count:,} {what}" for what, count in counts if count > 4)
     return f" of {many}: up to a minute the first time" if many else ""

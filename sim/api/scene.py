@@ -179,7 +179,7 @@ def _sees(camera: Camera, mesh: Mesh, size: tuple[int, int]) -> bool:
 def _without(loaded: LoadedMesh, albedo: bool, cutoffs: bool) -> LoadedMesh:
     """The mesh without vertex colours and textures, and without cutoffs of alpha; ``ignored`` names them.
 
-    ``albedo`` and ``cutoffs`` tell which of them the mesh loses.
+    If ``albedo``, the mesh loses vertex colours and textures. If ``cutoffs``, it loses cutoffs of alpha.
     """
     materials, left_out = loaded.materials, []
     mesh: dict[str, Any] = {}

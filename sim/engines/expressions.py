@@ -49,7 +49,7 @@ class Expression(NamedTuple):
     - ``among``: a word and a mask. The expression is not 0 if, and only if, bit k of the mask is set, where k
       is the value of the word.
     - ``bits``: a variable, and the last and first of some of its bits. The expression equals these bits. If
-      the expression has only 1 bit and they are several, it equals their OR.
+      the expression has only 1 bit, and these bits are several, the expression equals the OR of these bits.
     - ``zeros``: a variable, last and first bit, and a number. The expression is the count of leading zeros of
       these bits plus the number.
     """

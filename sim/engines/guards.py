@@ -80,7 +80,7 @@ class _Item:
 
 @dataclass
 class _Block:
-    """Statements under the same results of conditions; ``questions``: the conditions among them, by text."""
+    """Statements under the same results of conditions. ``questions``: the conditional statements, by text."""
 
     items: list[_Item] = field(default_factory=list)
     questions: dict[str, _Item] = field(default_factory=dict)
@@ -201,7 +201,7 @@ class _Made:
                 self._lines.setdefault(match[1], []).append(line)
 
     def lines(self, word: str) -> list[str]:
-        """Lines that declare and assign a word that is read once; none for any other word."""
+        """Lines that declare and assign a word that is read once. Other words have no lines here."""
         lines = self._lines.get(word, [])
         if not lines or not re.fullmatch(rf"\tvalue<\d+> {word};", lines[0]):
             return []

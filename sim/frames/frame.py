@@ -56,7 +56,10 @@ class SimulatedFrame(Picture):
 
 
 _IDLE = 1000
-"""Idle timeout of several pipelines: cycles without a beat after which they are done. A pixel takes less."""
+"""Idle timeout of several pipelines: cycles without a beat after which they are done.
+
+A pixel takes fewer cycles.
+"""
 
 
 def beats_of(

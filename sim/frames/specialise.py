@@ -92,8 +92,8 @@ def specialise(
     on all lights and on the highlights. A method with vectors of spans therefore keeps all lights and the
     highlights.
 
-    If ``exact`` is false and all spans are short, the differences of ``chord-local`` also get fewer bits. The
-    error bound stays, but pixels may change.
+    If ``exact`` is false and all spans are short, the differences of ``chord-local`` also have fewer bits
+    than in the full pipeline. The error bound stays, but pixels may change.
 
     Parameters
     ----------

@@ -139,7 +139,8 @@ def sample_triangles(renderer: Renderer, size: tuple[int, int]) -> Triangles:
         x=corner[..., 0],
         y=corner[..., 1],
         depth=rng.integers(0, DEPTH.max_code, (count, 3)),
-        # No vertex normal is longer than 1. A design with several lights turns them, and needs this.
+        # No vertex normal is longer than 1. A design with several lights turns normals, and needs this
+        # length.
         normal=most // 3 + rng.integers(-most // 6, most // 6, (count, 3, 3)),
         material=np.arange(count) * renderer.design.materials // count,
         two_sided=np.arange(count) % 2,

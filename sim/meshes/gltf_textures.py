@@ -77,7 +77,7 @@ def texture_coordinates(info: dict, coordinates: np.ndarray) -> np.ndarray:
     """Coordinates scaled, then turned to ``(u cos + v sin, v cos - u sin)``, then moved.
 
     With v downwards this is anticlockwise, as the text of KHR_texture_transform and its example say. The
-    matrix beside that text turns the other way.
+    matrix in the same specification turns the other way.
 
     Parameters
     ----------

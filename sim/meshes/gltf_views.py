@@ -169,7 +169,7 @@ def placed_lights(
         return ()
     brightest = max(float(lux.max()) for lux, _, _ in placed)
     order = np.argsort([-lux.max() for lux, _, _ in placed], kind="stable")[:most]
-    one, many = (f"{what} beside the brightest ({most} fit)" for what in ("light", "lights"))
+    one, many = (f"{what} after the {most} brightest" for what in ("light", "lights"))
     found.tell(one, many, len(placed) - len(order))
     if brightest != 1 or any(light.kind != "directional" for _, light, _ in placed):
         found.tell("the unit of the lights' brightness (the brightest light counts 1)")

@@ -170,8 +170,9 @@ def surfaces(
     excludes the file's F_0, and the diffuse colour its k_a.
 
     Colours of vertices and textures multiply the diffuse colour, also if an option gives it. If a material
-    has them, and no diffuse colour, its diffuse colour is white. They multiply highlights, too, if the
-    metallic factor is 1/2 or more. An emission over 1 counts as 1, which already gives the brightest pixel.
+    has these colours, and no diffuse colour, its diffuse colour is white. Colours of vertices and textures
+    multiply highlights, too, if the metallic factor is 1/2 or more. An emission over 1 counts as 1, which
+    already gives the brightest pixel.
 
     Parameters
     ----------

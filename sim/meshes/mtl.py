@@ -22,7 +22,7 @@ from blysk.sim.run_files import reads
 
 __all__ = ["ObjImage", "find_obj_materials", "plain_lines"]
 
-# Keywords that are read, and keywords that have an effect only beside keywords of `_UNREAD`.
+# Keywords that are read, and keywords that have an effect only together with keywords of `_UNREAD`.
 _KNOWN = {"Kd", "Ks", "Ke", "Ns", "Pr", "Pm", "Ni", "sharpness", "Pcr", "anisor", "map_aat"}
 # Keywords that are not read: the meaning, and the number that changes nothing.
 _UNREAD = {
@@ -36,7 +36,7 @@ _UNREAD = {
     "illum": ("", 2),
 }
 _ALPHA_MAPS = ("map_d", "map_Tr")
-# Largest material file in bytes; 100,000 materials take less.
+# Largest material file in bytes. A file of 100,000 materials is smaller.
 _MAX_LIBRARY = 16_000_000
 _IMAGE = re.compile(
     r"^[ \t]*(?:map_\w+|norm|bump|disp|decal|refl)[ \t]+(\S.*)$", re.MULTILINE | re.IGNORECASE

@@ -25,7 +25,7 @@ _TYPES = {
     **{f"{'u' * (kind[0] == 'u')}int{8 * int(kind[1])}": kind for kind in _KINDS.values()},
     **{"float": "f4", "double": "f8", "float32": "f4", "float64": "f8"},
 }
-# Properties of three kinds: they are read; they change nothing; they change only the look of textures.
+# Known properties. Some are read. Others change nothing, or only the look of textures.
 _KNOWN = {
     "vertex": {"x", "y", "z", "nx", "ny", "nz", "s", "t", "u", "v", "texture_u", "texture_v"}
     | {"texture_s", "texture_t", "confidence", "intensity", "quality", "value", "flags", "radius"},

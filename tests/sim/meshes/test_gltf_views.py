@@ -109,7 +109,7 @@ def test_most_lights(tmp_path):
     loaded = load(tmp_path / "a.glb", lit(*lights))
     assert [light.color[0] for light in loaded.lights] == [k / 19 for k in range(4, 20)]
     # The first light is off.
-    assert loaded.ignored == ("3 lights beside the brightest (16 fit)", UNIT)
+    assert loaded.ignored == ("3 lights after the 16 brightest", UNIT)
     assert [light.color[0] for light in load_mesh(str(tmp_path / "a.glb"), lights=1).lights] == [1]
 
 
