@@ -89,7 +89,7 @@ class Wrapped(Component):
     unit : Component
         The unit.
     **members : Member
-        Members beside the unit's members, or in place of its ``status``.
+        Members besides the unit's members, or in place of its ``status``.
     """
 
     def __init__(self, unit: Component, **members: Member):
@@ -390,8 +390,8 @@ def killed(model: Mutants, vectors: Sequence[tuple[Drive, Trace]], mutants: Iter
     """Numbers of the mutants whose trace differs from the unit's trace for one of the stimuli.
 
     A counter of events has more bits than a run has events. Therefore, for each word of the status, the
-    shortest run that changes the word is made again. The counters begin at a power of 2 less 1, for each
-    power. So the next event changes one more bit.
+    shortest run that changes the word is made again. The counters begin at ``2^k - 1``, for each bit k from
+    1 on. So the next event sets bit k.
     """
     alive = set(mutants)
 

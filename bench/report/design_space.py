@@ -109,8 +109,8 @@ class Explored:
     cycles_per_pixel : float or None
         Upper bound from the figures of the units: the sum of ``max(cycles_per_pixel length, setup_interval)``
         of all spans, divided by the number of pixels. Writes of constants and latency are not included. A
-        frame takes less if a span is set up during the pixels of a longer span, or if pixels lack terms.
-        ``None`` for ``bisection``, because it states no interval of the spans that it divides.
+        frame takes fewer cycles if a span is set up during the pixels of a longer span, or if pixels lack
+        terms. ``None`` for ``bisection``, because it states no interval of the spans that it divides.
     out_of_range_spans : int
         Number of spans that are too wide, of `errors_of`.
     """

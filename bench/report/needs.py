@@ -75,7 +75,10 @@ def _lamp(width: int, height: int, triangles: int) -> Scene:
 
 
 _GATED = {"method": "quadratic", "model": "cosquad", "gate": True}
-"""A method whose spans do not change without highlights. Its gate can prove that they have no highlight."""
+"""A method whose spans are equal with and without highlights.
+
+Its gate can prove that spans have no highlight.
+"""
 
 SCENES: dict[str, tuple[Callable[[int, int, int], Scene], dict[str, Any] | None]] = {
     "copper teapot": (_teapot, None),

@@ -26,7 +26,10 @@ FLIP_P99 = 0.05
 FLIP_MAX = 0.10
 CIEDE2000_P99 = 1.0
 CIEDE2000_MAX = 2.3
-"""Limits of the verdict for larger errors. An eye just notices a colour difference of about 2.3."""
+"""Limits of the verdict for an error over `LARGEST_LSB`.
+
+An eye just notices a colour difference of about 2.3.
+"""
 
 
 @dataclass(frozen=True)

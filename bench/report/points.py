@@ -68,8 +68,8 @@ DESIGNS += [(method, "cosquad") for method in PUBLISHED]
 BEST = [method for method, interpolator in METHODS.items() if interpolator.operand == "cosine"]
 """Methods whose own operand is N·H, as in their documents.
 
-These methods are more exact with 1 - N·H. They have points with both operands, so each method is also
-compared in its best form. Variants as published are in `PUBLISHED`.
+These methods are more exact with 1 - N·H than with N·H. They have points with both operands, so each method
+is also compared in its best form. Variants as published are in `PUBLISHED`.
 """
 
 _BEST_OPERAND = {"operand": "one_minus_cosine"}

@@ -1,4 +1,4 @@
-"""The core of this project beside other cores: rate, device, resources, light per pixel, verification.
+"""The core of this project compared with other cores: rate, device, resources, light per pixel, verification.
 
 The figures of other cores are from their sources (docs/theory/references.md#other-hardware). None of these
 figures was measured here. A figure that we did not find in its source is "not found in its source".

@@ -1,8 +1,8 @@
 """``blysk board``: a mesh on a monitor, as a bitstream for a board, or simulated down to the lanes.
 
-Both use the same top module, `GpuUnit`. It draws the turning mesh from block RAM in bands, and sends them to
-a monitor at 640x480 and 60 Hz. For a bitstream the top gets the board's pins and a PLL. Tools that pip
-installs map, place and route the top. The reached clock rates are compared with the needed rates, and the
+Both use the same top module, `GpuUnit`. It draws the turning mesh from block RAM in bands, and sends the
+bands to a monitor at 640x480 and 60 Hz. For a bitstream the top gets the board's pins and a PLL. Tools that
+pip installs map, place and route the top. The reached clock rates are compared with the needed rates, and the
 bitstream is read back. In a simulation, models replace the output cells. The bits of the four lanes are
 decoded as in a monitor, and the frames are compared with the frames of the bit-accurate model.
 """

@@ -142,7 +142,7 @@ def _presets(scene: Scene, up: Any) -> list[Scene]:
 
 
 def _check_memory(board: Board, name: str, scene: Scene, buffer: BandBuffer, tables: int) -> None:
-    """Refuse a mesh that does not fit into the block RAMs beside the bands and further tables."""
+    """Refuse a mesh that does not fit into the block RAMs that bands and further tables leave free."""
     colours = block_rams(2 * buffer.pixels, sum(buffer.colour_bits))
     depths = block_rams(buffer.pixels, 27)
     left = board.block_rams - colours - depths - _RENDERER_BLOCKS - tables
@@ -153,7 +153,8 @@ def _check_memory(board: Board, name: str, scene: Scene, buffer: BandBuffer, tab
         least = MeshMemory.triangles_that_fit(left, screen_bits)
         raise InputError(
             f"--mesh {name}",
-            f"its {len(mesh.faces):,} triangles do not fit the memory of the {board.name} beside the bands",
+            f"its {len(mesh.faces):,} triangles do not fit the memory that the bands leave free on the "
+            f"{board.name}",
             f"use a mesh of at most about {least:,} triangles",
         )
 

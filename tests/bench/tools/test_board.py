@@ -50,8 +50,8 @@ def pattern_on(board):
         (["ulx3s-25f"], "board: nothing to write; give -o FILE.bit, or --simulate N -o FOLDER"),
         (
             ["ulx3s-25f", "--triangles", "3000", "--simulate", "1", "-o", "x"],
-            "--mesh teapot: its 3,080 triangles do not fit the memory of the ulx3s-25f beside the bands; use "
-            "a mesh of at most about 1,024 triangles",
+            "--mesh teapot: its 3,080 triangles do not fit the memory that the bands leave free on the "
+            "ulx3s-25f; use a mesh of at most about 1,024 triangles",
         ),
         (
             ["ulx3s-85f", "--triangles", "3000", "--clock", "5", "--simulate", "1", "-o", "x"],
