@@ -80,31 +80,16 @@ class FrameConstantsUnit(wiring.Component):
     clears every constant: exponent 0 and black light. Exponents 0 and 1001 to 1023 are accepted. They shade
     by the same formula, outside the stated error.
 
-    ======================== ==========================================================
-    address                  constant
-    ======================== ==========================================================
-    0                        exponent, 1 to 1000
-    1 to 3                   ambient red, green, blue, ``UQ(11, 6)`` LSB
-    4                        index of a material, where there are several
-    5                        taken by the tables of lobes, where they are loaded: `LobeMemory`
-    6                        threshold of a material's table
-    7                        bank of a material's table, where there are several
-    8 to 10                  emission red, green, blue, ``UQ(11, 6)`` LSB, with an albedo
-    11                       whether the material is tinted, with tints
-    12, 13                   texture of a material, with textures: `TextureDescriptor.words`
-    14, 15                   taken by the texel memory, with textures: `LoadedTextures.writes`
-    16 (light + 1) + 0 to 2  direction to the light, ``SQ(1, 17)``
-    16 (light + 1) + 3 to 5  half-way vector, ``SQ(1, 17)``
-    16 (light + 1) + 6 to 8  diffuse red, green, blue, ``UQ(11, 6)`` LSB
-    16 (light + 1) + 9 to 11 specular red, green, blue, ``UQ(11, 6)`` LSB
-    ======================== ==========================================================
+    `address_table` lists the addresses and formats of a design's constants. Verilog has this list in its
+    header. Tables of lobes take the writes to `LOBE_ADDRESS`, see `LobeMemory`. The texel memory takes those
+    to `TEXELS_ADDRESS` and `TEXEL_ADDRESS`, see `LoadedTextures.writes`.
 
     A constant has its value 2 cycles after its write was accepted. With several materials the exponent and
     the colours are in memories, one for each word. The memories are written for the material whose index was
-    last written to address 4. They are read for ``material``: 1 cycle after ``material`` changes, and 3
-    cycles after a write. All 18 bits of an index count. Writes for an index past the last material are lost.
-    A write of a bank past the last bank is lost, too. A unit of one material has no index, and address 4
-    changes nothing. Reset does not clear memories.
+    last written to `MATERIAL_ADDRESS`. They are read for ``material``: 1 cycle after ``material`` changes,
+    and 3 cycles after a write. All 18 bits of an index count. Writes for an index past the last material are
+    lost. A write of a bank past the last bank is lost, too. A unit of one material has no index, and ignores
+    `MATERIAL_ADDRESS`. Reset does not clear memories.
 
     Parameters
     ----------

@@ -21,6 +21,7 @@ from blysk.hdl.frame_constants import FrameConstantsUnit, existing_material, wri
 from blysk.hdl.methods.registry import unit_of
 from blysk.hdl.pixel_assembler import PixelAssemblerUnit, coordinates_shape, pixel_shape
 from blysk.hdl.pixel_shading import COMPACT_INTERVAL, PixelShading
+from blysk.hdl.port_descriptions import SPAN_COUNTER_BITS
 
 __all__ = ["ShadingPipelineUnit", "span_shape", "status_shape"]
 
@@ -74,8 +75,8 @@ def status_shape() -> data.StructLayout:
     """
     return data.StructLayout(
         {
-            "out_of_range_spans": unsigned(16),
-            "empty_spans": unsigned(16),
+            "out_of_range_spans": unsigned(SPAN_COUNTER_BITS),
+            "empty_spans": unsigned(SPAN_COUNTER_BITS),
             "overrun": unsigned(1),
         }
     )

@@ -1,6 +1,11 @@
 """Descriptions of the ports of a shading pipeline, for the table in its Verilog."""
 
-__all__ = ["COUNTER_TEXTS", "PORT_DESCRIPTIONS"]
+from blysk.golden.albedo.attribute_spans import AttributeSpans
+
+__all__ = ["COUNTER_TEXTS", "PORT_DESCRIPTIONS", "SPAN_COUNTER_BITS", "TEXTURE_TEXTS"]
+
+SPAN_COUNTER_BITS = 16
+"""Bits of a pipeline's counters of spans, which stop at their largest value."""
 
 COUNTER_TEXTS = {
     "empty": "triangles that cover no pixel",
@@ -21,6 +26,16 @@ COUNTER_TEXTS = {
 }
 """Description of each counter of a core, by its field in ``status``."""
 
+_BASE, _LEVEL = AttributeSpans.BASE_FORMAT, AttributeSpans.LEVEL_FORMAT
+
+TEXTURE_TEXTS = {
+    "base": f"base of u or v: whole texel from which it is counted, {_BASE.min_code} to {_BASE.max_code}",
+    "range": f"range of u or v, 0 to {AttributeSpans.LARGEST_RANGE}: the coordinate is "
+    "base + attribute 2^range texels",
+    "level": f"level of the texture, 0 to {_LEVEL.max_code}",
+}
+"""Descriptions of the words that place texture coordinates, of a span or a triangle."""
+
 PORT_DESCRIPTIONS = {
     "i_x": "column of the span's first pixel",
     "i_y": "row of the span",
@@ -36,9 +51,7 @@ PORT_DESCRIPTIONS = {
     "i_attributes_start": "attributes at the first pixel centre, in the order above",
     "i_attributes_step": "step of the attributes to the next pixel, times 2^i_attributes_exponent",
     "i_attributes_exponent": "exponent of i_attributes_step, 0 to 15",
-    "i_attributes_base": "base of u or v: whole texel from which it is counted, -4096 to 4095",
-    "i_attributes_range": "range of u or v, 0 to 11: the coordinate is base + attribute 2^range texels",
-    "i_attributes_level": "level of the texture, 0 to 15",
+    **{f"i_attributes_{name}": text for name, text in TEXTURE_TEXTS.items()},
     "o_x": "column of the pixel",
     "o_y": "row of the pixel",
     "o_r": "red",
@@ -50,7 +63,7 @@ PORT_DESCRIPTIONS = {
     "write_address": "address of the frame constant to write, from the list above",
     "write_data": "code of the frame constant; the core accepts it when no span is inside",
     **{
-        f"status_{name}": f"{COUNTER_TEXTS[name]}; since reset, up to 65535"
+        f"status_{name}": f"{COUNTER_TEXTS[name]}; since reset, up to {(1 << SPAN_COUNTER_BITS) - 1}"
         for name in ("out_of_range_spans", "empty_spans")
     },
     "status_overrun": COUNTER_TEXTS["overrun"],

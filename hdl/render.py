@@ -23,7 +23,7 @@ from blysk.hdl.geometry.mirror_adapter import MirrorAdapterUnit
 from blysk.hdl.geometry.span_adapter import connect_shading_span
 from blysk.hdl.geometry.triangles import COUNTER_BITS, counters_shape, frame_shape, triangle_shape
 from blysk.hdl.pipeline import ShadingPipelineUnit
-from blysk.hdl.port_descriptions import COUNTER_TEXTS
+from blysk.hdl.port_descriptions import COUNTER_TEXTS, TEXTURE_TEXTS
 
 __all__ = ["PORT_DESCRIPTIONS", "STATUS", "WAITING_SPANS", "RendererUnit"]
 
@@ -36,9 +36,7 @@ PORT_DESCRIPTIONS = {
     "i_depth": "depths of the three corners; a smaller depth is nearer",
     "i_normal": "N/W of the corners; first index: corner, second index: component",
     "i_surface": "attributes of the surface, listed above; first index: corner, second index: attribute",
-    "i_base": "base of u or v: whole texel from which it is counted, -4096 to 4095",
-    "i_range": "range of u or v, 0 to 11: the coordinate is base + attribute 2^range texels",
-    "i_level": "level of the texture, 0 to 15",
+    **{f"i_{name}": text for name, text in TEXTURE_TEXTS.items()},
     "i_material": "index of the triangle's material; an index past the last material counts as the last",
     "i_two_sided": "read if back_faces is 2: 1 turns the normals of a back face, 0 culls the face",
     "o_x": "column of the pixel",

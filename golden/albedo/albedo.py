@@ -3,6 +3,7 @@
 from collections.abc import Collection, Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from typing import ClassVar
 
 import numpy as np
 
@@ -49,8 +50,15 @@ class Albedo:
 
     FORMAT = UQ(1, 16)
 
-    PARTS = ("colors", "nearest", "bilinear", "outside", "tinted", "orthographic")
-    """Words that `of_parts` takes."""
+    PARTS: ClassVar[dict[str, str]] = {
+        "colors": "vertex colours",
+        "nearest": "textures of one texel a sample",
+        "bilinear": "textures with the mean of four texels",
+        "outside": "texels in a memory outside of the core",
+        "tinted": "metals, whose colour also multiplies the highlight",
+        "orthographic": "only for cameras without perspective",
+    }
+    """Words that `of_parts` takes, with their meanings."""
 
     def __post_init__(self) -> None:
         if not (self.colors or self.texture):
@@ -63,9 +71,7 @@ class Albedo:
         Parameters
         ----------
         parts : collection of str
-            Words of `PARTS`. ``colors``: vertex colours. ``nearest`` or ``bilinear``: textures with this
-            filter. ``outside``: texels in a memory outside of the design. ``tinted``: metals.
-            ``orthographic``: only for cameras without perspective, whose attributes are not divided by W.
+            Words of `PARTS`. Attributes of an orthographic camera are not divided by W.
 
         Raises
         ------

@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import accumulate
 
 import numpy as np
 
@@ -15,6 +16,10 @@ BANKS = 4
 
 LEVEL_BITS = 4
 """Bits of a level, and of the logarithm of a width or height."""
+
+_WIDTHS = (LEVEL_BITS, LEVEL_BITS, 2, 2, 1)
+_PLACES = tuple(accumulate(_WIDTHS[:-1], initial=0))
+"""Bits of width, height, both wraps and ``nearest`` in the first word of a descriptor, and their places."""
 
 _BASE_UNIT = 2
 """Words of a bank in one unit of a base, or of an index."""
@@ -82,15 +87,15 @@ class TextureDescriptor:
         The first has width in bits 0 to 3, height in 4 to 7, wrap of u in 8 to 9 and of v in 10 to 11, and
         ``nearest`` in bit 12. The second is the base.
         """
-        first = self.width | self.height << LEVEL_BITS | self.wrap[0] << 8 | self.wrap[1] << 10
-        return first | int(self.nearest) << 12, self.base
+        fields = (self.width, self.height, *self.wrap, int(self.nearest))
+        return sum(value << place for value, place in zip(fields, _PLACES, strict=True)), self.base
 
     @classmethod
     def of_words(cls, first: int, base: int) -> "TextureDescriptor":
         """The descriptor of two words."""
-        sides, mask = first & 0xFF, (1 << LEVEL_BITS) - 1
-        wrap = first >> 8 & 3, first >> 10 & 3
-        return cls(sides & mask, sides >> LEVEL_BITS, wrap, bool(first >> 12 & 1), base)
+        fields = zip(_PLACES, _WIDTHS, strict=True)
+        width, height, *wrap, nearest = (first >> place & (1 << bits) - 1 for place, bits in fields)
+        return cls(width, height, (wrap[0], wrap[1]), bool(nearest), base)
 
 
 @dataclass(frozen=True, eq=False)

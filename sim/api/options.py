@@ -302,9 +302,8 @@ NEEDS: dict[str, Option] = {
     "albedo": Option(
         Several("part", Albedo.PARTS),
         None,
-        "Colours of pixels. colors: vertex colours. nearest, bilinear: textures with this filter. outside: "
-        "texels in a memory outside of the core. tinted: metals, whose colour also multiplies the highlight. "
-        "orthographic: only for cameras without perspective.  [default: none]",
+        f"Colours of pixels. {' '.join(f'{word}: {text}.' for word, text in Albedo.PARTS.items())}  "
+        "[default: none]",
     ),
 }
 """Parts of a design that a scene decides, for commands without a scene."""

@@ -25,7 +25,7 @@ _COUNTS = {
     "several_levels": "triangles that have a single level of a texture, and would need several",
     "hidden_spans": "spans without a pixel that shows, left out",
     "cut_out_pixels": "pixels dropped before the depth test, as their alpha is under the cutoff",
-    "hidden_pixels": "pixels shaded behind earlier pixels",
+    "hidden_pixels": COUNTER_TEXTS["hidden"],
     "dropped_pixels": COUNTER_TEXTS["dropped"],
     "cut_spans": "spans cut to the range of the method",
     "missed_spans": "spans over 0.25 LSB off with this method",
