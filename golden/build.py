@@ -35,7 +35,7 @@ class BuildError(ValueError):
     Parameters
     ----------
     option : str
-        Field of `Build` that contradicts another field.
+        Field of `Build`, or of the design, that contradicts another field.
     reason, remedy : str
         Reason of the conflict, and an action that mends it.
     """

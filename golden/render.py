@@ -5,6 +5,7 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
+from blysk.golden.build import BuildError
 from blysk.golden.frame_constants import FrameConstants, by_material
 from blysk.golden.geometry.coarse_depth import CoarseDepth
 from blysk.golden.geometry.depth_tester import DepthTester
@@ -113,11 +114,12 @@ class Renderer:
                 "use quotient"
             )
         if self.design.build.setups > 1:
-            raise ValueError("vertex colours and textures take one lane of triangle setup; take setups 1")
+            reason = "vertex colours and textures take one lane of triangle setup"
+            raise BuildError("setups", reason, "leave out setups")
         if not albedo.perspective:
-            raise ValueError("hardware geometry gives 1/W of every pixel; take an albedo with perspective")
+            raise BuildError("albedo", "hardware geometry gives 1/W of every pixel", "leave out orthographic")
         if albedo.texture is not None and albedo.texture.memory.external:
-            raise ValueError("hardware geometry needs its texels inside; take a memory that is not external")
+            raise BuildError("albedo", "hardware geometry needs its texels inside", "leave out outside")
         return replace(found, surface=albedo.spans)
 
     @property

@@ -169,9 +169,7 @@ def built(design: AnyDesign, given: Mapping[str, Any]) -> AnyDesign:
     try:
         made = cast(AnyDesign, design.built(**values))
     except BuildError as error:
-        value = values.get(error.option, "")
-        shown = value if isinstance(value, int | str) and value is not True else ""
-        raise OptionError(error.option, shown, error.reason, error.remedy) from None
+        raise _refused(error, values) from None
     try:
         PixelPipelines(made)
     except ValueError as error:
@@ -181,11 +179,20 @@ def built(design: AnyDesign, given: Mapping[str, Any]) -> AnyDesign:
 
         try:
             Renderer(made)
+        except BuildError as error:
+            raise _refused(error, values) from None
         except ValueError as error:
             option, value = ("geometry", "hardware") if hardware else ("top", made.build.top)
             reason, _, remedy = str(error).partition("; ")
             raise OptionError(option, value, reason, f"{remedy}, or spans from software") from None
     return made
+
+
+def _refused(error: BuildError, values: Mapping[str, Any]) -> OptionError:
+    """The error of a build option, with its value if that says more than that it is given."""
+    value = values.get(error.option, "")
+    shown = value if isinstance(value, int | str) and value is not True else ""
+    return OptionError(error.option, shown, error.reason, error.remedy)
 
 
 @contextmanager

@@ -8,6 +8,7 @@ from pathlib import Path
 from time import perf_counter
 from typing import Any, Unpack, cast
 
+from blysk.golden.build import BuildError
 from blysk.golden.frame_constants import FrameConstants
 from blysk.golden.frames.prepare import constants_of
 from blysk.golden.frames.surface import design_for, with_albedo
@@ -195,9 +196,6 @@ def _fitted(design: ShadingPipeline, scene: Scene, settings: Settings) -> Shadin
         if not design.interpolator.geometry(design.lights).vectors:
             reason = "hardware geometry gives vertex colours and textures to method quotient alone"
             raise settings.refuse("method", reason, "use quotient, or geometry software", design.method)
-        if design.build.setups > 1:
-            reason = "vertex colours and textures take one lane of triangle setup"
-            raise settings.refuse("setups", reason, "leave out setups")
         if scene.textures:
             try:
                 check_texels(scene)
@@ -211,6 +209,11 @@ def _fitted(design: ShadingPipeline, scene: Scene, settings: Settings) -> Shadin
     except ValueError as error:
         reason, _, remedy = str(error).partition("; ")
         raise InputError("textures", reason, remedy) from None
+    if fitted.albedo is not None and hardware:
+        try:
+            Renderer(fitted)
+        except BuildError as error:
+            raise settings.refuse(error.option, error.reason, error.remedy) from None
     if fitted.albedo is not None:
         constants = [FrameConstants.of(scene, index=index) for index in range(len(scene.materials))]
         try:

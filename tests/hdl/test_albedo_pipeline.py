@@ -61,7 +61,7 @@ def test_texels_outside_are_refused_where_they_have_no_port():
     for option, value in (("pipes", 2), ("bus", "axi")):
         with pytest.raises(BuildError, match=rf"^{option}: only a single native core has texels out"):
             outside.built(**{option: value})
-    with pytest.raises(ValueError, match=r"^hardware geometry needs its texels inside; take a memory"):
+    with pytest.raises(ValueError, match=r"^albedo: hardware geometry needs its texels inside; leave out"):
         Renderer(outside)
 
 
@@ -70,9 +70,11 @@ def test_an_albedo_of_triangles_is_refused_where_geometry_does_not_serve_it():
     assert Renderer(design).geometry.surface == AttributeSpans()
     with pytest.raises(ValueError, match=r"^hardware geometry has no .* for method renormalise; use quot"):
         Renderer(replace(preset("renormalise"), albedo=Albedo()))
-    with pytest.raises(ValueError, match=r"^hardware geometry gives 1/W of every pixel; take an albedo with"):
+    with pytest.raises(ValueError, match=r"^albedo: hardware geometry gives 1/W of every pixel; leave out"):
         Renderer(replace(design, albedo=Albedo(perspective=False)))
-    with pytest.raises(ValueError, match=r"^vertex colours and textures take one lane .*; take setups 1"):
+    with pytest.raises(
+        ValueError, match=r"^setups: vertex colours and textures take one lane .*; leave out setups"
+    ):
         Renderer(design.built(top="render", setups=2))
     with pytest.raises(ValueError, match=r"^the geometry gives other attributes of the surface than"):
         Renderer(design, Geometry(vectors=True))

@@ -40,9 +40,9 @@ def test_verilog():
             "--geometry hardware",
             "use quotient, or spans from software",
         ),
-        ([*TRIANGLES, "--setups", "2"], "--geometry hardware", "take setups 1, or spans from software"),
-        ([*TRIANGLES[:-1], "colors,orthographic"], "--geometry hardware", "take an albedo with perspective"),
-        ([*TRIANGLES[:-1], "nearest,outside"], "--geometry hardware", "take a memory that is not external"),
+        ([*TRIANGLES, "--setups", "2"], "--setups 2", "one lane of triangle setup; leave out setups"),
+        ([*TRIANGLES[:-1], "colors,orthographic"], "--albedo", "1/W of every pixel; leave out orthographic"),
+        ([*TRIANGLES[:-1], "nearest,outside"], "--albedo", "needs its texels inside; leave out outside"),
     ],
 )
 def test_refused(refused, options, thing, says):
