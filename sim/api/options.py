@@ -292,7 +292,9 @@ DESIGN: dict[str, Option] = {
 
 NEEDS: dict[str, Option] = {
     "lights": Option(Whole(1, MAX_LIGHTS), 1, "Number of lights."),
-    "materials": Option(Whole(1, MAX_MATERIALS), 1, "Number of materials. They share up to 64 lobe tables."),
+    "materials": Option(
+        Whole(1, MAX_MATERIALS), 1, "Number of materials. All materials share up to 64 lobe tables."
+    ),
     "factors": Option(
         Whole(0, MAX_LIGHTS),
         0,

@@ -76,12 +76,12 @@ def load_mesh(
 
     *Geometry.* All meshes of a scene are put together in world coordinates: vertices by the node's matrix
     ``M``, normals by its inverse transpose. A mirroring node (``det M < 0``) reverses the order of corners.
-    Points and lines beside a mesh are left out. Polygons of OBJ and PLY files are cut into triangles that
-    cover them and keep all their corners. Concave polygons are cut by ear clipping. Strips of PLY and glTF
-    are drawn. Quantised and sparse arrays of glTF are read. All instances of a node are drawn. Morph weights
-    and skins are not applied. A glTF file without scenes shows its root nodes. Invisible nodes
-    (KHR_node_visibility) are left out. Text files may begin with a byte order mark, and may have any line
-    ends.
+    Points and lines in a file with a mesh are left out. Polygons of OBJ and PLY files are cut into triangles.
+    The triangles cover the polygons and keep all their corners. Concave polygons are cut by ear clipping.
+    Strips of PLY and glTF are drawn. Quantised and sparse arrays of glTF are read. All instances of a node
+    are drawn. Morph weights and skins are not applied. A glTF file without scenes shows its root nodes.
+    Invisible nodes (KHR_node_visibility) are left out. Text files may begin with a byte order mark, and may
+    have any line ends.
 
     *Materials.* Of a GLB or glTF file these are read:
 

@@ -98,7 +98,7 @@ def read_obj(data: bytes, found: Found, images: Mapping[int, ObjImage], painted:
     if bad := re.search(corners, data, re.MULTILINE):
         raise Refused(f"a face has the corners {shown(bad[1].decode().strip())!r}, not indices")
     if re.search(rb"^f .*(?<= )-?0+(?=[/\s]|\Z)", data, re.MULTILINE):
-        raise Refused("a face has the vertex index 0; they count from 1")
+        raise Refused("a face has the vertex index 0, but the first vertex has index 1")
     if re.search(rb"^f\b.*[ \t/]-\d", data, re.MULTILINE):
         data = _absolute(data)
     vertices, normals = _rows(data, b"v"), _rows(data, b"vn")
