@@ -110,8 +110,8 @@ class LightUnit(wiring.Component):
 
     With an initiation interval of 1 the diffuse and the specular unit run in lockstep. Their latencies are
     equal, and they accept and give the same beats on the same cycles. So one handshake serves both. With a
-    longer interval dark beats bypass the specular unit. Dark beats wait in order beside the specular
-    unit, and take two cycles each.
+    longer interval, dark beats bypass the specular unit. Dark beats wait in order beside the specular unit,
+    and take two cycles each.
 
     For beats that are not dark, the specular unit determines the latency, the initiation interval and the
     multipliers. With a longer interval the latency is a cycle longer. For a light that fades a `FactorUnit`
