@@ -120,7 +120,7 @@ def explore(
     if out_of_range:
         print(
             f"too narrow  {out_of_range} of {len(designs)} designs: "
-            "the scene has spans wider than they can shade"
+            "the scene has spans wider than these designs can shade"
         )
     best = cheapest(designs, error, largest, cost)
     most = f"{largest:g} LSB of linear light"
@@ -136,7 +136,10 @@ def explore(
     listed = best[:limit]
     print(_table([designs[index] for index in listed], on_front[listed]))
     if any(designs[index].candidate.design.interpolator.given_values for index in listed):
-        print("chord-local gets values of each light with each span. Its cost leaves out their computation.")
+        print(
+            "chord-local gets values of each light with each span. The cost of a design leaves out the "
+            "computation of these values."
+        )
     for number, index in enumerate(listed, 1):
         print(f"{number:>3}  {designs[index].candidate.command}")
 

@@ -268,8 +268,8 @@ def _drawing(found: Sequence[Mapping[str, Any]], best: Mapping[str, Any]) -> Dra
         "points of every span as input, so it is not on the front. `phong` is not on the front either, "
         "because its errors are against (R·V)^n. The line is the front. Names stand at the front, and at the "
         "best and the worst design of each method. Before the pipeline, the host or the hardware of "
-        "`blysk verilog --geometry` cuts spans from triangles and prepares their normals. This work is not "
-        "counted. The cycles of each part of a cut span are counted."
+        "`blysk verilog --geometry` cuts spans from triangles and prepares the spans' normals. This work "
+        "is not counted. The cycles of each part of a cut span are counted."
     )
     if in_ns and len(placed) < len(found):
         without = ", ".join(of["label"] for of in found if not of["ns"])

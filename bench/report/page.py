@@ -36,10 +36,10 @@ AXES = {
     "rmse_lsb": "Root of the mean square over pixels and channels. 1 LSB is a step of an 8-bit channel of "
     "linear light.",
     "psnr_db": "Peak signal to noise ratio. More is better, so the axis is reversed.",
-    "flip_p99": "FLIP, the difference that an eye sees, 0 to 1. One pixel in a hundred has more.",
+    "flip_p99": "FLIP, the difference that an eye sees, 0 to 1. One pixel in a hundred has a larger value.",
     "flip_max": "FLIP, the difference that an eye sees, 0 to 1. The value of the worst pixel.",
     "ciede2000_p99": "CIEDE2000 colour difference. An eye just notices about 2.3. One pixel in a hundred has "
-    "more.",
+    "a larger value.",
     "ciede2000_max": "CIEDE2000 colour difference. An eye just notices about 2.3. The value of the worst "
     "pixel.",
     "cycles_per_pixel": "Cycles of the simulated pipeline from the first write of a constant to the last "

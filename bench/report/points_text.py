@@ -133,8 +133,8 @@ def text(points: Sequence[Mapping[str, Any]]) -> list[str]:
     if modelled:
         engines += (
             f". Its bit-accurate model computed {len(modelled):,} frames. A simulated pipeline of the "
-            "same method with the same spans gives their cycles. The difference of latency is added. Without "
-            "this simulation the cycle model gives the cycles"
+            "same method with the same spans gives the cycles of these frames. The difference of "
+            "latency is added. Without this simulation the cycle model gives the cycles"
         )
     return [*map(_glance, _by_scene(points).values()), of_error, of_time, f"{engines}."]
 

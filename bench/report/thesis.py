@@ -378,10 +378,11 @@ _DOCUMENT = Document(
             "thesis-hardware",
             "The same in hardware: figure of the baseline, divided by that of the unit",
             _units,
-            "A figure above 1 means that the unit of [T] takes less. Cells are operators, multiplexers, "
-            "registers and memories of any width, before technology mapping. An interpolator includes its "
-            "setup, and gives N·L and N·H of one light. A dash means that the unit has none of the "
-            "resource. `blysk blocks` prints each unit's own figures. The sections *The documents' criteria* "
+            "A figure above 1 means that the unit of [T] takes less than the baseline. Cells are operators, "
+            "multiplexers, registers and memories of any width, before technology mapping. An interpolator "
+            "includes its setup, and gives N·L and N·H of one light. A dash means that the unit has none of "
+            "the resource. `blysk blocks` prints each unit's own figures. The sections "
+            "*The documents' criteria* "
             "and *Place and route* have cycles and clock rates of whole pipelines.",
             {"multipliers": "multipliers", "cells": "cells", "register bits": "register_bits"},
         ),

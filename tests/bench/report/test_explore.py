@@ -167,7 +167,7 @@ def test_no_design_under_the_error_is_one_line(monkeypatch, tmp_path):
 
 def test_what_is_given_is_told(monkeypatch):
     made_up(monkeypatch)
-    told = "chord-local gets values of each light with each span. Its cost leaves out their computation.\n"
+    told = "The cost of a design leaves out the computation of these values.\n"
     assert told in run("--methods", "chord-local").output
     assert told not in run("--methods", "angular").output
 
