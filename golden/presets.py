@@ -43,7 +43,7 @@ def _lines(module: ModuleType, *names: str) -> dict[Interpolator, str]:
     return {method: line for name in names for method, line in vars(module).get(name, {}).items()}
 
 
-_OWN = (
+_BUILT_IN = (
     linear_interpolator,
     renormalise_interpolator,
     bisection_interpolator,
@@ -58,8 +58,8 @@ _OWN = (
 """
 
 _MODULES = (
-    *_OWN,
-    *load_methods(method.name for module in _OWN for method in _lines(module, "METHODS", "PUBLISHED")),
+    *_BUILT_IN,
+    *load_methods(method.name for module in _BUILT_IN for method in _lines(module, "METHODS", "PUBLISHED")),
 )
 
 METHODS: dict[str, Interpolator] = {

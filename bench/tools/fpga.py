@@ -133,7 +133,12 @@ def units_of(names: Sequence[str]) -> Iterator[tuple[str, Callable[[], wiring.Co
         yield from ((entry.title, entry.variant.unit) for entry in found)
 
 
-_TOLD = {"style": "{}", "setup_interval": "interval {}", "pipes": "{} pipelines", "setups": "{} lanes"}
+_WORDS = {
+    "style": "{}",
+    "setup_interval": "interval {}",
+    "pipes": "{} pipelines",
+    "setups": "{} lanes",
+}
 """Words for build options in the name of a design, if they differ from the option's name and value."""
 
 
@@ -149,7 +154,7 @@ def name_of(design: ShadingPipeline, operand: str | None = None) -> str:
     name += [design.transfer] if design.transfer != "linear" else []
     default = vars(Build(top=build.top))
     changed = {option: value for option, value in vars(build).items() if value != default[option]}
-    name += [_TOLD.get(option, f"{option} {{}}").format(value) for option, value in changed.items()]
+    name += [_WORDS.get(option, f"{option} {{}}").format(value) for option, value in changed.items()]
     return ", ".join(name)
 
 

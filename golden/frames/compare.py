@@ -40,7 +40,7 @@ __all__ = [
     "target_of",
 ]
 
-_PART = 1 << 20
+_PIXELS_AT_ONCE = 1 << 20
 """Pixels of a part of a frame."""
 
 
@@ -307,8 +307,8 @@ def _compare(
 
 def _parts(pixels: np.ndarray) -> Iterator[np.ndarray]:
     """Indices of pixels part by part, as a large frame has 400 MB."""
-    for start in range(0, len(pixels), _PART):
-        yield pixels[start : start + _PART]
+    for start in range(0, len(pixels), _PIXELS_AT_ONCE):
+        yield pixels[start : start + _PIXELS_AT_ONCE]
 
 
 def _errors(image: np.ndarray, exact: np.ndarray, border: np.ndarray) -> FrameErrors:

@@ -195,6 +195,8 @@ def test_help_has_every_option_with_its_default():
     for function, options in ((blysk.scene, SCENE), (blysk.design, {**NEEDS, **DESIGN})):
         described = re.findall(r"^\s*([a-z_, ]+)( : .*)?$", function.__doc__, re.MULTILINE)
         assert options.keys() <= {name for names, _ in described for name in names.split(", ")}
+        for name, words in re.findall(r"^\s*([a-z_]+) : \{(.*)\}", function.__doc__, re.MULTILINE):
+            assert set(re.findall(r'"(\w+)"', words)) == set(options[name].kind.names), name
 
 
 def test_methods_and_models_are_listed():
