@@ -113,4 +113,4 @@ def test_bad_csv(tmp_path, monkeypatch, text, reason):
 def test_verilog_tells_the_addresses_of_tables():
     text = verilog(blysk.design(model="ggx", method="quadratic", gate=True))
     assert "next value of a table, UQ(0, 17); with bit 17 set, number of the bank whose table begins" in text
-    assert "of the table: where its highlight ends; UQ(3, 15)" in text
+    assert "of the table: where its highlight ends; UQ(0, 17)" in text

@@ -265,7 +265,7 @@ def test_shorter_words():
     """Narrow and short spans: pixels change by at most a step, and the pipeline costs less."""
     for mesh in (teapot(2000), FLOOR):
         scene = scene_of(size=(100, 80), mesh=mesh)
-        full = full_of(scene, method="chord-local")
+        full = full_of(scene, method="chord-local", gate=False)
         assert "fraction_bits" not in reasons(specialise(scene, full))
         special = specialise(scene, full, exact=False)
         assert reasons(special)["fraction_bits"].startswith(
