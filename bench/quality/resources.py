@@ -20,13 +20,13 @@ from blysk.hdl.pipeline import ShadingPipelineUnit
 from blysk.sim.frames.frame import FrameSimulator
 from blysk.sim.meshes.teapot import teapot
 
-__all__ = ["ENTRIES", "cycles_of", "measure"]
+__all__ = ["ENTRIES", "cycles_of", "measure", "scenes"]
 
 _EXPONENT = 50
 
 
 @cache
-def _scenes() -> dict[str, Scene]:
+def scenes() -> dict[str, Scene]:
     """A teapot with short spans, and a square with bent normals and long spans."""
     corners = np.array([(x, y, 0.0) for y in (-1, 1) for x in (-1, 1)])
     normals = normalise(corners * 0.1 + (0, 0, 1))
@@ -52,7 +52,7 @@ def cycles_of(design: ShadingPipeline) -> dict[str, int]:
         normals at 32x24.
     """
     simulator = FrameSimulator(design)
-    return {f"{name}_cycles": simulator.render(scene).cycles for name, scene in _scenes().items()}
+    return {f"{name}_cycles": simulator.render(scene).cycles for name, scene in scenes().items()}
 
 
 @dataclass(frozen=True)

@@ -93,7 +93,7 @@ def test_cycles_are_those_of_the_pixels():
     """The simulation runs to the last pixel, and takes at least a cycle a pixel."""
     design = preset("linear", "cosquad")
     cycles = cycles_of(design)
-    scenes = resources._scenes()
+    scenes = resources.scenes()
     assert set(cycles) == {f"{name}_cycles" for name in scenes}
     for name, scene in scenes.items():
         spans, constants = prepare(scene, design).spans, FrameConstants.of(scene)
@@ -109,7 +109,7 @@ def test_cycles_are_those_of_the_pixels():
 
 def test_frames_have_short_spans_and_long_ones():
     spans = {
-        name: prepare(scene, preset(model="cosquad")).spans for name, scene in resources._scenes().items()
+        name: prepare(scene, preset(model="cosquad")).spans for name, scene in resources.scenes().items()
     }
     assert np.median(spans["teapot"].length) < 4
     assert spans["square"].length.max() >= 16

@@ -10,7 +10,7 @@ import pytest
 from amaranth.hdl import UnusedElaboratable
 from click.testing import CliRunner
 
-from blysk.bench.quality import baselines
+from blysk.bench.quality import baselines, resources
 from blysk.bench.report import design_space, explore
 from blysk.bench.report.design_space import (
     Explored,
@@ -293,7 +293,7 @@ def test_stated_cycles_are_a_bound_of_those_of_frames():
                 figures = {"cycles_per_pixel": unit.cycles_per_pixel, "setup_interval": unit.setup_interval}
                 del unit
                 gc.collect()
-            for name, scene in baselines._scenes().items():
+            for name, scene in resources.scenes().items():
                 prepared = prepare(scene, candidate.design)
                 length = prepared.spans.length
                 counts = [[k, int(count)] for k, count in enumerate(np.bincount(length)) if count]
