@@ -93,7 +93,9 @@ class _Cutter:
         return cut_by_ends(self.raster, largest_ratio, self._also)
 
     def uncut(self) -> Raster:
-        return self.raster if self._also is None else _halve(self.raster, self._also)[0]
+        if self.design.albedo is None:
+            return self.raster
+        return cut_by_attributes(self.scene, self.raster)[0]
 
     def split_pairs(self) -> Raster:
         return split_pairs(self.raster, self._also)
