@@ -44,8 +44,10 @@ class _Group(click.Group):
         return sorted({*_COMMANDS, *_installed()})
 
     def get_command(self, ctx, cmd_name):
-        # This comes before the import, because Matplotlib looks for its folder when it is imported.
+        # These come before the import: Matplotlib looks for its folder when it is imported, and NumPy starts
+        # a thread for each core, which takes longer than the products of this package.
         provide_caches()
+        os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
         found = _command(cmd_name)
         return found.load() if isinstance(found, LazyCommand) else found
 
