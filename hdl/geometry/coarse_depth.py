@@ -87,21 +87,21 @@ class CoarseDepthUnit(wiring.Component):
     def elaborate(self, platform):
         """Blocks of a span; depths at both ends of each; the memory's word; comparison; the write."""
         m = Module()
-        given, bits = self.model, self.model.block.bit_length() - 1
+        model, bits = self.model, self.model.block.bit_length() - 1
         valid, answer, advance = Signal(name="valid"), Signal(name="answer"), Signal(name="advance")
         m.d.comb += advance.eq(skid_buffer(m, self.o, valid, answer))
         word = data.StructLayout(
             {
                 # The bound, inverted, so that a cleared word is 0.
-                "nearness": given.depth_bits,
-                "candidate": given.depth_bits,
-                "mask": given.block,
-                "tag": given.tag_bits,
+                "nearness": model.depth_bits,
+                "candidate": model.depth_bits,
+                "mask": model.block,
+                "tag": model.tag_bits,
             }
         )
-        m.submodules.words = memory = Memory(shape=word, depth=given.blocks, init=[])
+        m.submodules.words = memory = Memory(shape=word, depth=model.blocks, init=[])
         read, write = memory.read_port(), memory.write_port()
-        tag, empty = Signal(given.tag_bits, name="tag"), Signal(name="empty")
+        tag, empty = Signal(model.tag_bits, name="tag"), Signal(name="empty")
         span, span_valid, swept, sweeping, held = self._pictures(m, tag, empty)
         block, waiting = self._blocks(m, bits, advance, (span, span_valid, held))
         steps, ends, bound = self._bounds(m, bits, advance, block)
@@ -109,7 +109,7 @@ class CoarseDepthUnit(wiring.Component):
         part = Signal(bound.shape(), name="part")
         there = Signal(word, name="there", reset_less=True)
         # Words that were written after the word of the part was read.
-        late = data.StructLayout({"valid": 1, "place": range(given.blocks), "word": word})
+        late = data.StructLayout({"valid": 1, "place": range(model.blocks), "word": word})
         written = [Signal(late, name=f"written_{k}") for k in range(3)]
         same = [Signal(name=f"same_{k}") for k in range(3)]
         old, new = Signal(word, name="old"), Signal(word, name="new")
@@ -155,13 +155,13 @@ class CoarseDepthUnit(wiring.Component):
 
     def _pictures(self, m: Module, tag: Signal, empty: Signal) -> tuple:
         """The span taken in, whether it must wait for its picture, and the words that are cleared."""
-        given = self.model
-        shape = {"x": self.x_bits, "last": self.x_bits, "line": range(given.blocks), "picture": 1}
+        model = self.model
+        shape = {"x": self.x_bits, "last": self.x_bits, "line": range(model.blocks), "picture": 1}
         shape |= {"depth": SPAN_DEPTH.width, "step": DEPTH_STEP.width, "outside": 1}
         span = Signal(data.StructLayout(shape), name="span", reset_less=True)
         span_valid, picture = Signal(name="span_valid"), Signal(name="picture")
         fresh, used = Signal(name="fresh", init=1), Signal(name="used", reset_less=True)
-        left, place = Signal(range(given.blocks + 1), name="left"), Signal(range(given.blocks), name="place")
+        left, place = Signal(range(model.blocks + 1), name="left"), Signal(range(model.blocks), name="place")
         sweeping, other, held = Signal(name="sweeping"), Signal(name="other"), Signal(name="held")
         m.d.comb += [
             sweeping.eq(left.any()),
@@ -170,22 +170,22 @@ class CoarseDepthUnit(wiring.Component):
         ]
         with m.If(fresh):
             # A reset does not clear the memory.
-            m.d.sync += [fresh.eq(0), left.eq(Mux(used, given.blocks, 0))]
+            m.d.sync += [fresh.eq(0), left.eq(Mux(used, model.blocks, 0))]
         with m.Elif(sweeping):
-            m.d.sync += [left.eq(left - 1), place.eq(Mux(place == given.blocks - 1, 0, place + 1))]
+            m.d.sync += [left.eq(left - 1), place.eq(Mux(place == model.blocks - 1, 0, place + 1))]
         with m.Elif(span_valid & other & empty):
-            m.d.sync += [picture.eq(span.picture), tag.eq(tag + 1), left.eq(given.swept)]
+            m.d.sync += [picture.eq(span.picture), tag.eq(tag + 1), left.eq(model.swept)]
         with m.If(span_valid):
             m.d.sync += used.eq(1)
         return span, span_valid, place, sweeping, held
 
     def _blocks(self, m: Module, bits: int, advance: Signal, given_span: tuple) -> tuple[data.View, Value]:
         """Split spans into blocks, one a cycle. Also returns whether a block is there or will follow."""
-        given, incoming = self.model, self.i.payload
+        model, incoming = self.model, self.i.payload
         span, span_valid, held = given_span
         step = {"step": DEPTH_STEP.width, "outside": 1}
         ends = {"first": bits, "last": bits, "border": 1, "left": self.x_bits - bits}
-        ends |= {"place": range(given.blocks)} | step
+        ends |= {"place": range(model.blocks)} | step
         next_shape = ends | {"depth": SPAN_DEPTH.width, "back": _SUM_BITS}
         following = Signal(data.StructLayout(next_shape), name="following", reset_less=True)
         block_shape = {"valid": 1, "begins": 1, "ends": 1} | ends | {"depth": _SUM_BITS}
@@ -202,18 +202,18 @@ class CoarseDepthUnit(wiring.Component):
                 span_valid.eq(self.i.valid),
                 span.x.eq(incoming.x),
                 span.last.eq(incoming.x + incoming.length - 1),
-                span.line.eq(_times(given.blocks_per_line, incoming.y)),
+                span.line.eq(_times(model.blocks_per_line, incoming.y)),
                 span.picture.eq(incoming.picture),
                 span.depth.eq(Value.cast(incoming.depth)),
                 span.step.eq(Value.cast(incoming.depth_step)),
-                span.outside.eq((incoming.x + incoming.length > given.width) | (incoming.y >= given.height)),
+                span.outside.eq((incoming.x + incoming.length > model.width) | (incoming.y >= model.height)),
             ]
         with m.If(advance & goes):
             m.d.sync += [
                 following_valid.eq(span_valid & ~held),
                 following.first.eq(span.x[:bits]),
                 following.last.eq(span.last[:bits]),
-                following.border.eq(span.last == given.width - 1),
+                following.border.eq(span.last == model.width - 1),
                 following.left.eq(span.last[bits:] - span.x[bits:]),
                 following.place.eq(span.line + span.x[bits:]),
                 following.depth.eq(span.depth),
@@ -243,20 +243,20 @@ class CoarseDepthUnit(wiring.Component):
 
     def _bounds(self, m: Module, bits: int, advance: Signal, block: data.View) -> tuple[data.View, ...]:
         """Three stages: depth changes to both ends of a part, depths there, least and largest depth."""
-        given, last = self.model, self.model.block - 1
-        common = {"valid": 1, "begins": 1, "ends": 1, "place": range(given.blocks), "mask": given.block}
+        model, last = self.model, self.model.block - 1
+        common = {"valid": 1, "begins": 1, "ends": 1, "place": range(model.blocks), "mask": model.block}
         copied = ("valid", "begins", "ends", "place", "depth", "outside")
         both = dict.fromkeys(("near", "far"), _SUM_BITS)
         shape = common | {"falls": 1, "outside": 1} | both
         steps = Signal(data.StructLayout(shape | {"depth": _SUM_BITS}), name="steps")
         ends = Signal(data.StructLayout(shape), name="ends")
-        bounds = dict.fromkeys(("lo", "hi"), given.depth_bits)
+        bounds = dict.fromkeys(("lo", "hi"), model.depth_bits)
         bound = Signal(data.StructLayout(common | bounds), name="bound")
         slope = block.step.as_signed()
         marked = Mux(block.ends & ~block.border, block.last, last)
         # ``first`` is never beyond the last pixel of a block, and ``marked`` never before pixel 0.
         begun = [block.first <= k for k in range(last)] + [Const(1)]
-        not_over = [Const(1)] + [marked >= k for k in range(1, given.block)]
+        not_over = [Const(1)] + [marked >= k for k in range(1, model.block)]
         with m.If(advance):
             m.d.sync += [
                 *copy_fields(steps, block, copied),
@@ -271,7 +271,7 @@ class CoarseDepthUnit(wiring.Component):
                 # they are.
                 bound.lo.eq(Mux(ends.outside, 0, self._upper(Mux(ends.falls, ends.far, ends.near)))),
                 bound.hi.eq(
-                    Mux(ends.outside, given.deepest, self._upper(Mux(ends.falls, ends.near, ends.far)))
+                    Mux(ends.outside, model.deepest, self._upper(Mux(ends.falls, ends.near, ends.far)))
                 ),
             ]
         return steps, ends, bound

@@ -90,12 +90,12 @@ class BandBufferUnit(wiring.Component):
     def elaborate(self, platform):
         """The memory, both its sides, and the signals that cross between the sides."""
         m = Module()
-        given, width = self.model, sum(self.model.colour_bits)
-        m.submodules.colours = memory = Memory(shape=width, depth=2 * given.pixels, init=[])
+        model, width = self.model, sum(self.model.colour_bits)
+        m.submodules.colours = memory = Memory(shape=width, depth=2 * model.pixels, init=[])
         # `sync` writes that a buffer is filled, and its band. `pixel` writes that a buffer is free, whether
         # it was not shown, the slot, and the slot's beginning.
         self._filled, self._bands = Signal(2, name="filled"), [self._number(f"band_{k}") for k in range(2)]
-        self._freed, self._slot = Signal(2, name="freed"), self._number("slot", given.bands - 1)
+        self._freed, self._slot = Signal(2, name="freed"), self._number("slot", model.bands - 1)
         self._unseen = Signal(2, name="unseen", init=0b11)
         self._begun = Signal(name="begun")
         m.submodules.late = self._late = PulseSynchronizer("pixel", "sync")
@@ -119,23 +119,23 @@ class BandBufferUnit(wiring.Component):
 
     def _draw(self, m: Module, write) -> None:
         """Clear a free buffer that was not shown, ask for its band, write its pixels, pass it on."""
-        given = self.model
+        model = self.model
         freed, begun = Signal(2, name="freed_seen"), Signal(name="begun_seen")
         m.submodules += [FFSynchronizer(self._freed, freed), FFSynchronizer(self._begun, begun)]
-        before, slot = Signal(name="begun_before"), self._number("slot_seen", given.bands - 1)
+        before, slot = Signal(name="begun_before"), self._number("slot_seen", model.bands - 1)
         m.d.sync += before.eq(begun)
         with m.If(begun != before):
             m.d.sync += slot.eq(self._slot)
-        which, last = Signal(name="which"), self._number("last", given.bands - 1)
+        which, last = Signal(name="which"), self._number("last", model.bands - 1)
         busy, asked = Signal(2, name="busy"), Signal(name="asked")
         m.d.comb += busy.eq(self._filled ^ freed)
-        address = Signal(range(given.pixels), name="address")
+        address = Signal(range(model.pixels), name="address")
 
         coming, after_slot = self._plus_one(last), self._plus_one(slot)
         worth = (coming == after_slot) | (coming == self._plus_one(after_slot))
-        pixel, size = self.pixels.payload, (given.mode.horizontal.visible, given.lines)
-        place = Signal(range(2 * given.pixels), name="place")
-        word = Cat(pixel[channel][8 - bits :] for channel, bits in zip("rgb", given.colour_bits, strict=True))
+        pixel, size = self.pixels.payload, (model.mode.horizontal.visible, model.lines)
+        place = Signal(range(2 * model.pixels), name="place")
+        word = Cat(pixel[channel][8 - bits :] for channel, bits in zip("rgb", model.colour_bits, strict=True))
         m.d.comb += self.request.payload.eq(last)
         with m.FSM(name="draw"):
             with m.State("wait"), m.If(~Array(busy)[which]):
@@ -146,14 +146,14 @@ class BandBufferUnit(wiring.Component):
             with m.State("clear"):
                 m.d.comb += [place.eq(address), write.en.eq(1), self.request.valid.eq(~asked)]
                 m.d.sync += [address.eq(address + 1), asked.eq(asked | self.request.ready)]
-                with m.If(address == given.pixels - 1):
+                with m.If(address == model.pixels - 1):
                     m.next = "draw"
             with m.State("draw"):
                 m.d.comb += [
                     self.request.valid.eq(~asked),
                     self.pixels.ready.eq(1),
                     self.done.ready.eq(1),
-                    place.eq(_times(pixel.y, given.mode.horizontal.visible) + pixel.x),
+                    place.eq(_times(pixel.y, model.mode.horizontal.visible) + pixel.x),
                     write.en.eq(self.pixels.valid & is_inside(pixel, size)),
                     write.data.eq(word ^ self._clear),
                 ]
@@ -164,14 +164,14 @@ class BandBufferUnit(wiring.Component):
                         with m.If(which == k):
                             m.d.sync += [self._filled[k].eq(~self._filled[k]), band.eq(last)]
                     m.next = "wait"
-        m.d.comb += write.addr.eq(place + Mux(which, given.pixels, 0))
+        m.d.comb += write.addr.eq(place + Mux(which, model.pixels, 0))
         first = (begun != before) & (self._slot == 0)
         count_events(m, self.status, late_bands=self._late.o, frames=first)
 
     def _show(self, m: Module, read, clear) -> None:
         """Choose the buffer of each slot, read and clear it along with the timing, and give it back."""
-        given, timing = self.model, self.timing
-        line, frame = given.mode.horizontal, given.mode.vertical
+        model, timing = self.model, self.timing
+        line, frame = model.mode.horizontal, model.mode.vertical
         filled = Signal(2, name="filled_seen")
         m.submodules += FFSynchronizer(self._filled, filled, o_domain="pixel")
         full, fits, stays = (Signal(2, name=name) for name in ("full", "fits", "stays"))
@@ -182,9 +182,9 @@ class BandBufferUnit(wiring.Component):
                 fits[k].eq(full[k] & (band == coming)),
                 stays[k].eq(band == self._plus_one(coming)),
             ]
-        last_line = (timing.y & given.lines - 1 == given.lines - 1) & (timing.y < frame.visible)
+        last_line = (timing.y & model.lines - 1 == model.lines - 1) & (timing.y < frame.visible)
         is_shown, which = Signal(name="is_shown"), Signal(name="which_shown")
-        place = Signal(range(2 * given.pixels), name="place_shown")
+        place = Signal(range(2 * model.pixels), name="place_shown")
         with m.If(timing.active):
             m.d.pixel += place.eq(place + 1)
         with m.If(last_line & (timing.x == line.visible)):
@@ -202,7 +202,7 @@ class BandBufferUnit(wiring.Component):
                 self._begun.eq(~self._begun),
                 is_shown.eq(fits.any()),
                 which.eq(fits[1]),
-                place.eq(Mux(fits[1], given.pixels, 0)),
+                place.eq(Mux(fits[1], model.pixels, 0)),
                 self._freed.eq(self._freed ^ missed),
                 self._unseen.eq(self._unseen | missed),
             ]
@@ -215,7 +215,7 @@ class BandBufferUnit(wiring.Component):
         m.d.pixel += [later.eq(timing), coloured.eq(is_shown)]
         m.d.comb += copy_fields(self.shown, later, timing.shape().members)
         word = Mux(coloured, read.data, Const(0, len(read.data))) ^ self._clear
-        for channel, bits in zip("rgb", given.colour_bits, strict=True):
+        for channel, bits in zip("rgb", model.colour_bits, strict=True):
             code, word = word[:bits], word[bits:]
             m.d.comb += self.shown[channel].eq(Cat(code[2 * bits - 8 :], code) if bits < 8 else code)
 

@@ -45,32 +45,32 @@ class BandDepthUnit(wiring.Component):
     def elaborate(self, platform):
         """The memory, the tag and the sweep."""
         m = Module()
-        given, port = self.model, self.memory
-        bits = given.tag_bits
-        m.submodules.depths = memory = Memory(shape=DEPTH.width + bits, depth=given.words, init=[])
+        model, port = self.model, self.memory
+        bits = model.tag_bits
+        m.submodules.depths = memory = Memory(shape=DEPTH.width + bits, depth=model.words, init=[])
         read, write = memory.read_port(), memory.write_port()
         # After a reset no word in the memory is valid.
         fresh = Signal(name="fresh", init=1)
         tag, before = Signal(bits, name="tag"), Signal(bits, name="tag_before")
-        place, left = Signal(range(given.words), name="place"), Signal(range(given.words + 1), name="left")
+        place, left = Signal(range(model.words), name="place"), Signal(range(model.words + 1), name="left")
         m.d.comb += [before.eq(tag - 1), self.busy.eq(left != 0)]
         with m.If(self.begin):
-            m.d.sync += [tag.eq(tag + 1), left.eq(Mux(fresh, given.words, given.swept)), fresh.eq(0)]
+            m.d.sync += [tag.eq(tag + 1), left.eq(Mux(fresh, model.words, model.swept)), fresh.eq(0)]
         with m.Elif(self.busy):
-            m.d.sync += [left.eq(left - 1), place.eq(Mux(place == given.words - 1, 0, place + 1))]
+            m.d.sync += [left.eq(left - 1), place.eq(Mux(place == model.words - 1, 0, place + 1))]
 
         def address(place) -> Value:
-            return (place.y * given.size[0] + place.x)[: len(read.addr)]
+            return (place.y * model.size[0] + place.x)[: len(read.addr)]
 
         outside = Signal(name="read_outside")
         with m.If(port.read_enable):
-            m.d.sync += outside.eq(~is_inside(port.read_place, given.size))
+            m.d.sync += outside.eq(~is_inside(port.read_place, model.size))
         depth, its_tag = read.data[: DEPTH.width], read.data[DEPTH.width :]
         m.d.comb += [
             read.addr.eq(address(port.read_place)),
             read.en.eq(port.read_enable),
             port.read_data.eq(Mux((its_tag == tag) & ~outside, depth, DepthTester.CLEARED)),
-            write.en.eq((port.write_enable & is_inside(port.write_place, given.size)) | self.busy),
+            write.en.eq((port.write_enable & is_inside(port.write_place, model.size)) | self.busy),
             write.addr.eq(Mux(self.busy, place, address(port.write_place))),
             write.data.eq(Mux(self.busy, Cat(port.write_data, before), Cat(port.write_data, tag))),
         ]

@@ -39,25 +39,25 @@ class ControlsUnit(wiring.Component):
 
     def __init__(self, model: Controls | None = None):
         self.model = model or Controls()
-        given = self.model
+        model = self.model
         super().__init__(
             {
                 "buttons": In(len(BUTTONS)),
                 "frame": In(1),
                 "angle": Out(ANGLE_BITS),
-                "index": Out(range(given.materials * given.lights)),
+                "index": Out(range(model.materials * model.lights)),
             }
         )
 
     def elaborate(self, platform):
         """Buttons, then the state."""
         m = Module()
-        given = self.model
+        model = self.model
         pressed = dict(zip(BUTTONS, self._pressed(m), strict=True))
-        angle = Signal(ANGLE_BITS, name="angle_now", init=given.first)
+        angle = Signal(ANGLE_BITS, name="angle_now", init=model.first)
         running, backwards = Signal(name="running", init=1), Signal(name="backwards")
         chosen = [Signal(range(count), name=name) for name, count in self._counts()]
-        turned = Mux(backwards, angle - given.step, angle + given.step)[:ANGLE_BITS]
+        turned = Mux(backwards, angle - model.step, angle + model.step)[:ANGLE_BITS]
         with m.If((self.frame & running) | (pressed["step"] & ~running)):
             m.d.sync += angle.eq(turned)
         with m.If(pressed["pause"]):
@@ -67,7 +67,7 @@ class ControlsUnit(wiring.Component):
         for (name, count), value in zip(self._counts(), chosen, strict=True):
             with m.If(pressed[name]):
                 m.d.sync += value.eq(Mux(value == count - 1, 0, value + 1))
-        m.d.comb += [self.angle.eq(angle), self.index.eq(chosen[1] * given.materials + chosen[0])]
+        m.d.comb += [self.angle.eq(angle), self.index.eq(chosen[1] * model.materials + chosen[0])]
         return m
 
     def _counts(self):

@@ -74,9 +74,9 @@ class MotionUnit(wiring.Component):
     def elaborate(self, platform):
         """Cosine and sine, then for each entry two products and their sum."""
         m = Module()
-        given = self.model
+        model = self.model
         mask = (1 << OFFSET.width) - 1, (1 << ENTRY.width) - 1
-        columns = (given.constant, given.cosine, given.sine)
+        columns = (model.constant, model.cosine, model.sine)
         rows = [
             sum(
                 (value & mask[k > 0]) << shift
@@ -88,14 +88,14 @@ class MotionUnit(wiring.Component):
             shape=OFFSET.width + 2 * ENTRY.width, depth=len(rows), init=rows
         )
         read = memory.read_port()
-        sines = given.table.codes.tolist()
+        sines = model.table.codes.tolist()
         m.submodules.sines = table = Memory(shape=ENTRY.width - 1, depth=len(sines), init=sines)
         look = table.read_port()
 
         angle, index = Signal(ANGLE_BITS, name="angle"), Signal(range(ENTRIES), name="entry")
         address, step = Signal(range(len(rows)), name="address"), Signal(range(_STEPS), name="step")
         cosine, sine = (Signal(signed(ENTRY.width), name=name) for name in ("cosine", "sine"))
-        bits = given.TABLE_BITS
+        bits = model.TABLE_BITS
         code = Mux(step == 0, angle + (1 << bits), angle)[:ANGLE_BITS]
         negative = Signal(name="negative")
         looked = Mux(negative, -look.data, look.data)[: ENTRY.width].as_signed()

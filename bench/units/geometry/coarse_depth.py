@@ -14,13 +14,13 @@ __all__ = ["RECORD"]
 
 def _spans(unit, rng, count, longest=37, most=1 << 24, lines=None):
     """Overlapping spans of a small picture. A depth is less than ``most``, or is the largest depth."""
-    given = unit.model
-    longest = min(longest, given.width)
+    model = unit.model
+    longest = min(longest, model.width)
     length = rng.integers(1, longest + 1, count)
     # Every fourth span begins where the span before it ended, as with triangles side by side.
-    x = rng.integers(0, given.width - length + 1)
-    y = rng.integers(0, lines or given.height, count)
-    x[1::4] = np.minimum(x[0::4] + length[0::4], given.width - length[1::4])[: len(x[1::4])]
+    x = rng.integers(0, model.width - length + 1)
+    y = rng.integers(0, lines or model.height, count)
+    x[1::4] = np.minimum(x[0::4] + length[0::4], model.width - length[1::4])[: len(x[1::4])]
     y[1::4] = y[0::4][: len(y[1::4])]
     # Later spans are farther in most cases.
     base = np.sort(rng.integers(0, most, count)) // 2
@@ -40,14 +40,14 @@ def _short(unit, rng, count):
 def _outside(unit, rng, count):
     """Spans of a small picture. About every fourth span leaves the picture on the right or below."""
     case = _spans(unit, rng, count, 20, lines=2)
-    beats, given = case.beats, unit.model
+    beats, model = case.beats, unit.model
     far, low = rng.random((2, count)) < 0.15
     most = 1 << unit.x_bits
-    beats["x"] = np.where(far, rng.integers(given.width - 3, most, count), beats["x"])
+    beats["x"] = np.where(far, rng.integers(model.width - 3, most, count), beats["x"])
     beats["length"] = np.where(far, rng.integers(4, most, count), beats["length"])
     below = 1 << unit.y_bits
-    if given.height < below:
-        beats["y"] = np.where(low, rng.integers(given.height, below, count), beats["y"])
+    if model.height < below:
+        beats["y"] = np.where(low, rng.integers(model.height, below, count), beats["y"])
     return case
 
 
@@ -65,10 +65,10 @@ def _edges(unit, rng, count):
     bound, or the code before it. The nearest depth of the third span is in the same block. It is the first
     code of the next step behind both spans, or the code before it.
     """
-    given, groups = unit.model, -(-count // 3)
-    shift, size, columns = SPAN_DEPTH.width - given.depth_bits, given.block, given.blocks_per_line
+    model, groups = unit.model, -(-count // 3)
+    shift, size, columns = SPAN_DEPTH.width - model.depth_bits, model.block, model.blocks_per_line
     block, falls = rng.integers(0, columns, groups), rng.random(groups) < 0.5
-    first, end = block * size, np.minimum(block * size + size, given.width) - 1
+    first, end = block * size, np.minimum(block * size + size, model.width) - 1
 
     def line(edge, at, other, falls):
         """Any step of a depth that is ``edge`` at pixel ``at`` and in range at pixel ``other``."""
@@ -90,7 +90,7 @@ def _edges(unit, rng, count):
 
     # Some groups fill the block twice. The second time the depths are smaller.
     twice = rng.random(groups) < 0.125
-    upper = np.where(twice, 1, rng.integers(2, (1 << given.depth_bits) - 3, groups))
+    upper = np.where(twice, 1, rng.integers(2, (1 << model.depth_bits) - 3, groups))
     marked, filled = code(upper + np.where(twice, 2, rng.integers(-1, 2, groups))), code(upper)
     # Some groups leave out one pixel of the block. The block then gets no bound.
     gap, hole = ~twice & (rng.random(groups) < 0.25), rng.integers(first + 1, end)
@@ -100,7 +100,7 @@ def _edges(unit, rng, count):
     # A falling line may go on to the right, where it is nearer. A rising line may come from the left.
     limits = (
         np.where(gap, hole + 1, np.where(falls, first, size * rng.integers(0, block + 1))),
-        np.where(falls & ~gap, np.minimum(size * rng.integers(block + 1, columns + 1), given.width) - 1, end),
+        np.where(falls & ~gap, np.minimum(size * rng.integers(block + 1, columns + 1), model.width) - 1, end),
     )
     fills = span(*limits, filled, falls, True)
     nearest = code((np.where(twice, filled, np.maximum(marked, filled)) >> shift) + 1)
@@ -113,7 +113,7 @@ def _edges(unit, rng, count):
         name: np.stack(values, axis=1).ravel()[:count]
         for name, *values in zip(names, marks, fills, covered, strict=True)
     }
-    places = {"y": rng.integers(0, given.height, groups), "picture": np.arange(groups) % 2}
+    places = {"y": rng.integers(0, model.height, groups), "picture": np.arange(groups) % 2}
     return Case(beats | {name: np.repeat(values, 3)[:count] for name, values in places.items()})
 
 
