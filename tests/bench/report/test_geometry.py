@@ -106,7 +106,8 @@ def test_section(monkeypatch):
     ]
     monkeypatch.setattr(geometry, "read_store", lambda: store)
     chosen = tasks(True)
-    results = [_result(10, 4000, 8000), _result(15, 2000, 8000), _result(9, 4000, 4000), *[cases("quotient")] * 3]
+    results = [_result(10, 4000, 8000), _result(15, 2000, 8000), _result(9, 4000, 4000)]
+    results += [cases("quotient")] * 3
     made = section(chosen, results)
     assert made.text[2].startswith(
         "Compared with `quotient, compact`, `quadratic, compact` has 1 fewer multipliers. It takes 1.00 of "

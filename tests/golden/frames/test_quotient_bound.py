@@ -46,9 +46,7 @@ def test_no_frame_exceeds_its_bound(model):
     assert max(ratios) > 0.6
 
 
-@pytest.mark.parametrize(
-    "model", ["blinn", pytest.param("phong", marks=[pytest.mark.long, pytest.mark.ci])]
-)
+@pytest.mark.parametrize("model", ["blinn", pytest.param("phong", marks=[pytest.mark.long, pytest.mark.ci])])
 def test_no_frame_by_triangles_exceeds_its_bound(model):
     """The bound holds where the frame shows the triangle that the exact frame shows.
 
