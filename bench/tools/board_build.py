@@ -12,11 +12,13 @@ from typing import Any
 
 from amaranth.hdl import Elaboratable
 
+from blysk.bench.tools import absorb_registers as absorbing
 from blysk.bench.tools.absorb_registers import absorb_registers
 from blysk.bench.tools.boards import Board, packages_missing
 from blysk.bench.tools.families import ECP5, signal_name
-from blysk.bench.tools.place_and_route import MAP_AFTER, MAP_BEFORE, YOSYS
-from blysk.bench.tools.tool_runner import MOUNT, GivenUp, TooLarge, ToolError, ToolRunner
+from blysk.bench.tools.kept_builds import KeptBuild
+from blysk.bench.tools.place_and_route import MAP_AFTER, MAP_BEFORE, YOSYS, versions_of
+from blysk.bench.tools.tool_runner import MOUNT, GivenUp, TooLarge, ToolError, ToolRunner, Watch
 
 __all__ = [
     "Built",
@@ -182,6 +184,9 @@ def build(
 ) -> Built:
     """Make the bitstream of a top that requests its pins from the platform.
 
+    The mapped netlist and each routed placement are kept in the cache as soon as they are there. So an
+    interrupted build goes on where it was.
+
     Parameters
     ----------
     board : Board
@@ -194,7 +199,7 @@ def build(
         Largest number of placements to try until every clock is met. If none meets all, the result is the
         best placement.
     progress : callable
-        Called with the name of each step.
+        Called with the name of each step, and every 30 seconds with the state of a step, see `Watch`.
 
     Raises
     ------
@@ -217,8 +222,14 @@ def build(
         for file in ("top.il", "top.lpf"):
             text = plan.files[file]
             (folder / file).write_bytes(text if isinstance(text, bytes) else text.encode())
+        script = _script(rates["sync"])
+        options = repr((board.options, _LAYOUT, _SETTINGS, versions_of(ECP5)))
+        step = Path(absorbing.__file__).read_bytes()
+        kept = KeptBuild((plan.files["top.il"], plan.files["top.lpf"], script, options, step))
         progress("mapping")
-        runner.run("Yosys", YOSYS, [], folder, _script(rates["sync"]))
+        if not kept.take(folder, "netlist.json"):
+            runner.run("Yosys", YOSYS, [], folder, script, watch=Watch("mapping", progress))
+            kept.keep(folder, "netlist.json")
         mapped = json.loads((folder / "netlist.json").read_text(encoding="utf-8"))
         mapped, absorbed = absorb_registers(mapped)
         mapped["modules"]["top"]["settings"] = _SETTINGS
@@ -228,7 +239,7 @@ def build(
         for seed in range(1, seeds + 1):
             progress(f"placement {seed}")
             try:
-                _place(board, runner, folder, seed)
+                _place(board, runner, folder, seed, kept, progress)
             except GivenUp as error:
                 reason = error
                 continue
@@ -283,7 +294,20 @@ def refuse_too_large(board: Board, netlist: Mapping[str, Any]) -> None:
         raise TooLarge(f"does not fit the {board.name}: {', '.join(over)}")
 
 
-def _place(board: Board, runner: ToolRunner, folder: Path, seed: int) -> None:
+def _place(
+    board: Board,
+    runner: ToolRunner,
+    folder: Path,
+    seed: int,
+    kept: KeptBuild,
+    tell: Callable[[str], object],
+) -> None:
+    """Place and route the mapped netlist from a seed, or take what is kept of this placement."""
+    results, given_up = (f"{seed}.config", f"{seed}.json"), f"{seed}.txt"
+    if kept.take(folder, *results):
+        return
+    if kept.take(folder, given_up):
+        raise GivenUp((folder / given_up).read_text(encoding="utf-8"))
     options = [
         *board.options,
         *_LAYOUT,
@@ -291,11 +315,17 @@ def _place(board: Board, runner: ToolRunner, folder: Path, seed: int) -> None:
         *("--report", f"{MOUNT}/{seed}.json", "--seed", str(seed), "--timing-allow-fail"),
     ]
     try:
-        runner.run("nextpnr", _nextpnr("nextpnr_ecp5"), options, folder, given_up=_stuck)
+        watch = Watch(f"placement {seed}", tell, _stuck)
+        runner.run("nextpnr", _nextpnr("nextpnr_ecp5"), options, folder, watch=watch)
+    except GivenUp as error:
+        (folder / given_up).write_text(str(error), encoding="utf-8")
+        kept.keep(folder, given_up)
+        raise
     except ToolError as error:
         if "legal placement" in str(error) or "Unable to place" in str(error):
             raise TooLarge(f"does not fit the {board.name}: {error}") from None
         raise
+    kept.keep(folder, *results)
 
 
 def _used(report: Mapping[str, Any], kind: str) -> tuple[int, int]:

@@ -224,7 +224,8 @@ def place(designs: Designs, family: Family, seeds: int, jobs: int, inside: bool,
         for name, unit in designs:
             bar.set_description_str(name)
             try:
-                layouts.append(lay_out(name, unit(), seeds, jobs, bar.update, family, inside))
+                found = lay_out(name, unit(), seeds, jobs, bar.update, bar.set_postfix_str, family, inside)
+                layouts.append(found)
             except TooLarge as error:
                 if len(designs) == 1:
                     raise

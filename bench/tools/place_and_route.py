@@ -22,7 +22,8 @@ from blysk.bench.tools import absorb_registers as absorbing
 from blysk.bench.tools.absorb_registers import Absorbed, absorb_registers
 from blysk.bench.tools.defaults import SEEDS
 from blysk.bench.tools.families import ECP5, Family, Parts, Place, kind_of_cell, signal_name
-from blysk.bench.tools.tool_runner import MOUNT, GivenUp, TooLarge, ToolError, ToolRunner
+from blysk.bench.tools.kept_builds import KeptBuild
+from blysk.bench.tools.tool_runner import MOUNT, GivenUp, TooLarge, ToolError, ToolRunner, Watch
 from blysk.sim.engines.cache import cache_folder, version_of
 from blysk.sim.errors import InputError
 from blysk.sim.installation import install_extra
@@ -329,13 +330,14 @@ def lay_out(
     seeds: int = SEEDS,
     jobs: int = 1,
     progress: Callable[[], object] = lambda: None,
+    tell: Callable[[str], object] = lambda line: None,
     family: Family = ECP5,
     absorb: bool = True,
 ) -> Layout:
     """Synthesise a component, then place and route it from seeds 1, 2, ....
 
-    Results are kept in the cache, by netlist, tools and options. The result of each seed is kept as soon as
-    it is there. So an interrupted run can continue.
+    Results are kept in the cache, by netlist, tools and options. The mapped netlist and the result of each
+    seed are kept as soon as they are there. So an interrupted run can continue.
 
     Parameters
     ----------
@@ -349,6 +351,8 @@ def lay_out(
         Number of processes at a time.
     progress : callable
         Called after each seed.
+    tell : callable
+        Called with a line of each running tool every 30 seconds, see `Watch`.
     family : Family
         Family of the device.
     absorb : bool
@@ -379,7 +383,8 @@ def lay_out(
             progress()
     missing = [seed for seed in range(1, seeds + 1) if seed not in found]
     if missing:
-        with contextlib.closing(_run(netlist, missing, jobs, family, absorb)) as results:
+        kept = KeptBuild(parts)
+        with contextlib.closing(_run(netlist, missing, jobs, family, absorb, kept, tell)) as results:
             for seed, entry in results:
                 _store(folder / f"{key}-{seed}.json", *entry)
                 found[seed] = entry
@@ -388,18 +393,37 @@ def lay_out(
 
 
 def map_cells(
-    netlist: str, folder: Path, runner: ToolRunner, family: Family, absorb: bool
+    netlist: str,
+    folder: Path,
+    runner: ToolRunner,
+    family: Family,
+    absorb: bool,
+    kept: KeptBuild | None = None,
+    watch: Watch | None = None,
 ) -> tuple[dict[str, Any], Absorbed]:
-    """Map a netlist in RTLIL to a family's cells. Returns Yosys's JSON, and counts of `absorb_registers`."""
-    (folder / "top.il").write_text(netlist, encoding="utf-8")
-    runner.run("Yosys", YOSYS, [], folder, MAP_BEFORE + family.synthesis + MAP_AFTER)
+    """Map a netlist in RTLIL to a family's cells. Returns Yosys's JSON, and counts of `absorb_registers`.
+
+    With ``kept``, the mapped netlist is taken from the cache, or kept there.
+    """
+    if kept is None or not kept.take(folder, "netlist.json"):
+        (folder / "top.il").write_text(netlist, encoding="utf-8")
+        script = MAP_BEFORE + family.synthesis + MAP_AFTER
+        runner.run("Yosys", YOSYS, [], folder, script, watch=watch)
+        if kept is not None:
+            kept.keep(folder, "netlist.json")
     mapped = json.loads((folder / "netlist.json").read_text(encoding="utf-8"))
     _refuse_untimed(mapped, family)
     return absorb_registers(mapped) if absorb else (mapped, Absorbed())
 
 
 def _run(
-    netlist: str, seeds: Sequence[int], jobs: int, family: Family, absorb: bool
+    netlist: str,
+    seeds: Sequence[int],
+    jobs: int,
+    family: Family,
+    absorb: bool,
+    kept: KeptBuild,
+    tell: Callable[[str], object],
 ) -> Iterator[tuple[int, tuple[Parts, Place]]]:
     """Run the tools, and yield the result of each seed as soon as it is done."""
     runner = ToolRunner()
@@ -408,7 +432,9 @@ def _run(
     with tempfile.TemporaryDirectory(prefix="blysk-") as name, ThreadPoolExecutor(jobs) as pool:
         folder = Path(name)
         try:
-            mapped, absorbed = pool.submit(map_cells, netlist, folder, runner, family, absorb).result()
+            watch = Watch("mapping", tell)
+            mapping = pool.submit(map_cells, netlist, folder, runner, family, absorb, kept, watch)
+            mapped, absorbed = mapping.result()
             _write_without_ports(folder / "top.json", mapped)
             kinds = Counter(cell["type"] for cell in mapped["modules"]["top"]["cells"].values())
             _refuse_too_large(kinds, family)
@@ -423,14 +449,16 @@ def _run(
                 path = folder / f"{seed}.json"
                 files = ["--json", f"{MOUNT}/top.json", "--report", f"{MOUNT}/{path.name}"]
                 arguments = [*options, *files, "--seed", str(seed)]
+                step = f"seed {seed}"
                 try:
                     rerouted = False
                     try:
-                        runner.run("nextpnr", nextpnr, arguments, folder, given_up=_stuck)
+                        runner.run("nextpnr", nextpnr, arguments, folder, watch=Watch(step, tell, _stuck))
                     except GivenUp:
                         rerouted = True
                         arguments.remove(_RIPUP)
-                        runner.run("nextpnr", nextpnr, arguments, folder)
+                        watch = Watch(f"{step}, routed without a target", tell)
+                        runner.run("nextpnr", nextpnr, arguments, folder, watch=watch)
                 except ToolError as error:
                     if "legal placement" in str(error):
                         raise TooLarge(f"does not fit: from seed {seed} {error}") from None

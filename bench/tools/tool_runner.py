@@ -1,20 +1,28 @@
 """Runs the tools that map, place and route, in a folder, with a limit to their attempts."""
 
 import os
+import re
 import subprocess
 import sys
 import tempfile
 import threading
+import time
 from collections.abc import Callable, Sequence
 from pathlib import Path
 
 from blysk.hdl.emit.processes import Process
 from blysk.sim.engines.engine import SimulationError
 
-__all__ = ["MOUNT", "GivenUp", "TooLarge", "ToolError", "ToolRunner"]
+__all__ = ["MOUNT", "GivenUp", "TooLarge", "ToolError", "ToolRunner", "Watch"]
 
 _SECONDS = 5
 """Seconds between two readings of a tool's output."""
+
+_TOLD = 30
+"""Seconds between two lines of a `Watch`."""
+
+_ROUND = re.compile(r"^Info:\s+iter=(\d+) wires=\d+ overused=(\d+)", re.MULTILINE)
+"""A round of the router in nextpnr's log, and the number of wires that are used twice."""
 
 MOUNT = "/job"
 """Path, in the tool's sandbox, of the folder in which it runs. The tool sees only this folder."""
@@ -32,6 +40,36 @@ class GivenUp(ToolError):
     """A tool was stopped because it would not have finished."""
 
 
+class Watch:
+    """Tells every 30 seconds how far a tool is, and says when the tool is to be given up.
+
+    Parameters
+    ----------
+    step : str
+        Name of the step, such as ``placement 2``.
+    tell : callable
+        Called with each line: the step, the router's last round, and the time since the watch was made.
+    stuck : callable, optional
+        Called with the tool's output so far. It returns the reason to give the tool up, or an empty text.
+    """
+
+    def __init__(
+        self, step: str, tell: Callable[[str], object], stuck: Callable[[str], str] = lambda said: ""
+    ):
+        self._step, self._tell, self._stuck = step, tell, stuck
+        self._begin = self._told = time.monotonic()
+
+    def __call__(self, said: str) -> str:
+        """Judge the output so far. Returns the reason to give the tool up, or an empty text."""
+        now = time.monotonic()
+        if now - self._told >= _TOLD:
+            self._told = now
+            rounds = [f"round {number}, {wires} wires used twice" for number, wires in _ROUND.findall(said)]
+            passed = f"{int(now - self._begin) // 60}:{int(now - self._begin) % 60:02} min"
+            self._tell(f"{self._step}: {', '.join([*rounds[-1:], passed])}")
+        return self._stuck(said)
+
+
 class ToolRunner:
     """Runs several tools at a time, and can stop all of them."""
 
@@ -47,11 +85,11 @@ class ToolRunner:
         arguments: Sequence[str],
         folder: Path,
         text: str = "",
-        given_up: Callable[[str], str] | None = None,
+        watch: Callable[[str], str] | None = None,
     ) -> None:
         """Run Python code in a folder, with a text as its standard input.
 
-        `given_up` is called every few seconds with the tool's output so far. If it returns a reason, the tool
+        `watch` is called every few seconds with the tool's output so far. If it returns a reason, the tool
         is stopped, and `GivenUp` is raised. `ToolError` is raised if the tool fails or if `stop` stops it.
         """
         # Python's own warnings do not belong to the tool's output.
@@ -74,11 +112,11 @@ class ToolRunner:
             try:
                 while process.returncode is None:
                     try:
-                        process.wait(_SECONDS if given_up else None)
+                        process.wait(_SECONDS if watch else None)
                     except subprocess.TimeoutExpired:
                         # The tool writes at the file's position. `pread` does not move this position.
                         size = os.fstat(log.fileno()).st_size
-                        if reason := given_up(os.pread(log.fileno(), size, 0).decode(errors="replace")):
+                        if reason := watch(os.pread(log.fileno(), size, 0).decode(errors="replace")):
                             raise GivenUp(reason) from None
             finally:
                 process.kill()

@@ -22,7 +22,7 @@ def calls(monkeypatch):
     """Stubs of the tools, which write the same files and note their calls."""
     calls = Calls()
 
-    def run(self, name, code, arguments, folder, text="", given_up=None):
+    def run(self, name, code, arguments, folder, text="", watch=None):
         calls.append((name, *arguments[-1:]))
         calls.arguments = arguments
         if name == "Yosys":

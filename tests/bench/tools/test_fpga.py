@@ -142,7 +142,7 @@ def test_command(options, family, calls, cache, tmp_path, capsys):
 def test_device_by_the_number_of_pipelines(options, device, capsys, monkeypatch):
     """Several pipelines take the larger device, unless another is given."""
 
-    def lays_out(name, unit, seeds, jobs, progress, family, absorb):
+    def lays_out(name, unit, seeds, jobs, progress, tell, family, absorb):
         return Layout(name, Parts(1, 2, 3, 4, 5), (Place(1, 130.0, "a", "b", 4.0, 3.0, {}),))
 
     monkeypatch.setattr(fpga, "lay_out", lays_out)
