@@ -27,7 +27,8 @@ _OTHERS = (
         "about 30 at 1024x768",
         "Phong of every pixel, deferred",
     ),
-    ("PixelForge", "Cyclone V", "not stated", "not stated", "at vertices, no highlight"),
+    ("PixelForge", "Cyclone V", "500 to 1,000", "60 at 640x480", "at vertices, no highlight"),
+    ("OpenGlory", "XCKU040, 175 MHz", "Quake", "about 15", "none"),
 )
 """Figures of other designs as their authors publish them, see theory/references.md#other-hardware."""
 
