@@ -65,7 +65,7 @@ def check(rows):
 
 @pytest.mark.long
 @pytest.mark.parametrize(
-    ("files", "every", "least"), [pytest.param(250, 4, 500, marks=pytest.mark.ci), (20, 1, 900)]
+    ("files", "every", "least"), [pytest.param(120, 4, 350, marks=pytest.mark.ci), (20, 1, 900)]
 )
 def test_much_malformed_input(tmp_path, files, every, least):
     """CI has the files and every fourth bad option. The long run has every option."""
