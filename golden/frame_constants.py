@@ -124,7 +124,8 @@ class FrameConstants:
     texture : TextureDescriptor, optional
         Texture of the material, for a design with textures.
     texels : LoadedTextures, optional
-        Contents of the texel memory. Only the constants of the first material have them.
+        Contents of the texel memory, if texels are written. Only the constants of the first material have
+        them.
     """
 
     exponent: int
@@ -410,7 +411,8 @@ def address_table(
             rows.append((TINTED_ADDRESS, 1, "tinted"))
         if albedo.texture is not None:
             rows.append((TEXTURE_ADDRESS, 2, "texture"))
-            rows += [(TEXELS_ADDRESS, 1, "texels"), (TEXEL_ADDRESS, 1, "texel")]
+            if albedo.texture.memory.fixed is None:
+                rows += [(TEXELS_ADDRESS, 1, "texels"), (TEXEL_ADDRESS, 1, "texel")]
     for light in range(lights):
         base = (light + 1) * LIGHT_STRIDE
         rows += [(base + first, count, name) for name, (first, count) in FIELDS_OF_A_LIGHT.items()]

@@ -306,7 +306,7 @@ class ShadingPipelineUnit(wiring.Component):
             if self.model.texels_outside:
                 connect(m, unit.request, wiring.flipped(self.texel_request))
                 connect(m, wiring.flipped(self.texel_response), unit.response)
-            else:
+            elif unit.model.texture.memory.written:
                 self._load_texels(m, unit.write)
         return albedo, (source.valid, source.ready)
 

@@ -70,6 +70,8 @@ def command(context, board_name, mesh, output, simulate, colours, clock, toggles
     the frames with the bit-accurate model. The exit status is 1 if a frame differs, or if the frames are too
     heavy for 60 Hz.
 
+    Vertex colours and textures are drawn if the board has room for them. If not, a warning says why.
+
     The buttons of the board stop the motion, reverse it, and change the material and the light.
 
     \b

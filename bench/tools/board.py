@@ -21,6 +21,7 @@ from blysk.bench.tools.board_build import Built, build
 from blysk.bench.tools.board_design import BoardTop, gpu_of, least_cycles
 from blysk.bench.tools.boards import Board
 from blysk.bench.tools.tool_runner import ToolError
+from blysk.golden.albedo.albedo import Albedo
 from blysk.golden.frames.border import BORDER
 from blysk.golden.frames.compare import compare_image
 from blysk.golden.gpu import Gpu
@@ -123,10 +124,23 @@ def design_lines(board: Board, mesh: str, gpu: Gpu, plan: ClockPlan) -> Iterator
     lights = "1 light" if design.lights == 1 else f"{design.lights} lights"
     codes = f"codes of {SPACES[design.transfer]}"
     yield f"{'shading':<12}{design.method}, {design.model}, {lights}, {style} geometry, {codes}"
+    if design.albedo is not None:
+        yield f"{'surface':<12}{_surface(design.albedo)}"
     bits = "".join(map(str, buffer.colour_bits))
     yield f"{'display':<12}640x480 at 60 Hz, bands of {buffer.lines} lines, RGB{bits}"
     rates = ", ".join(f"{name} {float(rate) / 1e6:.6g} MHz" for name, rate in plan.rates.items())
     yield f"{'clocks':<12}{rates}"
+
+
+def _surface(albedo: Albedo) -> str:
+    """Text about vertex colours and textures."""
+    parts = ["vertex colours"] if albedo.colors else []
+    if (texture := albedo.texture) is not None and texture.memory.fixed is not None:
+        loaded = texture.memory.fixed
+        sizes = {(1 << of.width, 1 << of.height) for of in loaded.descriptors}
+        width, height = max(sizes, key=lambda size: size[0] * size[1])
+        parts.append(f"texture of {width}x{height} texels" + (", or smaller" if len(sizes) > 1 else ""))
+    return f"{' and '.join(parts)}" + (", without levels of detail" if albedo.texture else "")
 
 
 def _frame_cycles(gpu: Gpu, plan: ClockPlan) -> float:

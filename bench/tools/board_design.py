@@ -12,8 +12,10 @@ from scipy.spatial.transform import Rotation
 
 from blysk.bench.tools.board_options import COLOURS, DEFAULTS
 from blysk.bench.tools.boards import Board
+from blysk.golden.albedo.texel_memory import BANKS
 from blysk.golden.frames.frame import background_code
-from blysk.golden.geometry.triangles import ATTRIBUTE, DEPTH, GRID
+from blysk.golden.frames.surface import fixed_albedo_of, one_level
+from blysk.golden.geometry.triangles import GRID
 from blysk.golden.gpu import Gpu
 from blysk.golden.lighting.specular import MAX_EXPONENT
 from blysk.golden.pipeline import ShadingPipeline
@@ -27,14 +29,16 @@ from blysk.golden.video.display_timing import VGA
 from blysk.golden.video.draw_unit import Drawing
 from blysk.golden.video.mesh_memory import MeshMemory, block_rams
 from blysk.golden.video.serialiser import LANES
+from blysk.golden.video.triangle_assembly import screen_bits
 from blysk.hdl.methods.registry import unit_of
 from blysk.hdl.video.clocks import ClockUnit
 from blysk.hdl.video.output_cells import OutputCells
 from blysk.sim.api.design import design_of
 from blysk.sim.api.options import DESIGN, SCENE
-from blysk.sim.api.scene import load, scenes_of, warn_of_ignored
+from blysk.sim.api.scene import load, scenes_of, warn_of_ignored, without_albedo
 from blysk.sim.api.settings import Settings, read_settings
 from blysk.sim.errors import InputError
+from blysk.sim.meshes.loaded_mesh import LoadedMesh
 
 __all__ = ["BoardTop", "gpu_of", "least_cycles"]
 
@@ -50,8 +54,20 @@ MAX_LIGHTS = 4
 _SHINIER = 4
 """Exponent of the second material, as a multiple of the exponent of the first material."""
 
-_RENDERER_BLOCKS = 19
-"""Block RAMs, in a placed design, of the renderer's tables and buffers, command lists and motion."""
+_RENDERER_BLOCKS = {"compact": 19, "throughput": 45}
+"""Block RAMs of the renderer's tables and buffers, command lists and motion, by the style of geometry."""
+
+_SURFACE_BLOCKS = {
+    "compact": {(True, False): 9, (False, True): 9, (True, True): 13},
+    "throughput": {(True, False): 17, (False, True): 16, (True, True): 26},
+}
+"""Further block RAMs with vertex colours and textures, by the style, without texels and mesh.
+
+The keys tell whether there are colours and textures.
+"""
+
+_LEAST_SIDE = 16
+"""Smallest side to which a larger texture is reduced."""
 
 _TRANSFER_BLOCKS = 2
 """Block RAMs of the table of sRGB, with a port for each channel."""
@@ -65,6 +81,9 @@ def gpu_of(
     The presets combine two materials with two positions of the lights. The materials are the given material,
     and the same material with four times the exponent. The lights are the given lights, or the given lights
     turned by a quarter around the up direction.
+
+    Vertex colours and textures are drawn if the board has room for them. A larger image is halved until it
+    fits. A warning names everything that is left out.
 
     Parameters
     ----------
@@ -87,14 +106,19 @@ def gpu_of(
     with settings.located():
         if settings["size"] != VGA.size:
             raise settings.refuse("size", "the display has 640x480 pixels", "leave it out", "")
-        loaded = load(settings, lights=MAX_LIGHTS, local=False, albedo=False)
-        warn_of_ignored(loaded)
-        (scene,) = scenes_of(loaded, settings)
-        design = _design(settings, scene, board)
+        loaded = load(settings, lights=MAX_LIGHTS, local=False, cutoffs=False)
+        bits = COLOURS[colours]
+        try:
+            scene, design, less = _fitted(board, settings, loaded, bits)
+        except _NoRoom as error:
+            loaded, less = without_albedo(loaded, str(error)), ""
+            (scene,) = scenes_of(loaded, settings)
+            design = _design(settings, scene, board)
+        warn_of_ignored(replace(loaded, ignored=(*loaded.ignored, *([less] if less else []))))
     scenes = _presets(scene, settings["up"])
     red, green, blue = background_code(scene, design.transfer).tolist()
-    buffer = BandBuffer(VGA, board.lines, colour_bits=COLOURS[colours], background=(red, green, blue))
-    _check_memory(board, mesh, scene, buffer, 0 if design.transfer == "linear" else _TRANSFER_BLOCKS)
+    buffer = BandBuffer(VGA, board.lines, colour_bits=bits, background=(red, green, blue))
+    _check_memory(board, mesh, scene, design, bits)
     try:
         drawing = Drawing.of(
             scenes, design, lines=buffer.lines, axis=settings["up"], controls=Controls(materials=2, lights=2)
@@ -141,16 +165,67 @@ def _presets(scene: Scene, up: Any) -> list[Scene]:
     ]
 
 
-def _check_memory(board: Board, name: str, scene: Scene, buffer: BandBuffer, tables: int) -> None:
-    """Refuse a mesh that does not fit into the block RAMs that bands and further tables leave free."""
-    colours = block_rams(2 * buffer.pixels, sum(buffer.colour_bits))
-    depths = block_rams(buffer.pixels, 27)
-    left = board.block_rams - colours - depths - _RENDERER_BLOCKS - tables
-    screen_bits = 2 * GRID.bits + DEPTH.width + 3 * ATTRIBUTE.width + 1
+class _NoRoom(Exception):
+    """The board has no room for vertex colours and textures. The message is the reason."""
+
+
+def _fitted(
+    board: Board, settings: Settings, loaded: LoadedMesh, bits: tuple[int, int, int]
+) -> tuple[Scene, ShadingPipeline, str]:
+    """Scene and design of a mesh with its vertex colours and textures, and a text about smaller images.
+
+    Raises
+    ------
+    _NoRoom
+        If the board or the method has no room for them.
+    """
+    (scene,) = scenes_of(loaded, settings)
+    design = _design(settings, scene, board)
+    if not scene.has_albedo:
+        return scene, design, ""
+    largest = max((max(of.size) for of in scene.textures.values()), default=1)
+    for level in range(max(largest.bit_length() - _LEAST_SIDE.bit_length(), 0) + 1):
+        shown = one_level(scene, level)
+        made = replace(design, albedo=fixed_albedo_of(shown, design.has_highlights))
+        try:
+            surface = Renderer(made).geometry.surface
+            memory = MeshMemory.of([shown.mesh], surface, shown.textures)
+        except ValueError as error:
+            raise _NoRoom(str(error).partition("; ")[0]) from None
+        free, screen = _free_blocks(board, made, bits), screen_bits(GRID, surface)
+        if memory.blocks(screen) <= free:
+            less = f"details of images ({largest >> level} of {largest} texels a side fit the {board.name})"
+            return shown, made, less if level else ""
+    if most := MeshMemory.triangles_that_fit(free, screen, surface=surface):
+        raise _NoRoom(f"with them the {board.name} has block RAMs for about {most:,} triangles")
+    raise _NoRoom(f"the {board.name} has too few block RAMs for them; use ulx3s-85f")
+
+
+def _free_blocks(board: Board, design: ShadingPipeline, bits: tuple[int, int, int]) -> int:
+    """Block RAMs that bands, renderer, further tables and texels leave free for the mesh."""
+    pixels = VGA.size[0] * board.lines
+    style = "compact" if design.build.compact_geometry else "throughput"
+    taken = block_rams(2 * pixels, sum(bits)) + block_rams(pixels, 27) + _RENDERER_BLOCKS[style]
+    taken += 0 if design.transfer == "linear" else _TRANSFER_BLOCKS
+    if (albedo := design.albedo) is not None:
+        taken += _SURFACE_BLOCKS[style][albedo.colors, albedo.texture is not None]
+        if albedo.texture is not None:
+            memory = albedo.texture.memory
+            taken += BANKS * block_rams(memory.depth, memory.WORD_BITS)
+    return board.block_rams - taken
+
+
+def _check_memory(
+    board: Board, name: str, scene: Scene, design: ShadingPipeline, bits: tuple[int, int, int]
+) -> None:
+    """Refuse a mesh that does not fit into the block RAMs that are left for it."""
+    if design.albedo is not None:
+        return
+    left, screen = _free_blocks(board, design, bits), screen_bits()
     mesh, most = scene.mesh, MeshMemory.LARGEST - 1
     fits = len(mesh.faces) <= most and len(mesh.vertices) <= most
-    if not fits or MeshMemory.of([mesh]).blocks(screen_bits) > left:
-        least = MeshMemory.triangles_that_fit(left, screen_bits)
+    if not fits or MeshMemory.of([mesh]).blocks(screen) > left:
+        least = MeshMemory.triangles_that_fit(left, screen)
         raise InputError(
             f"--mesh {name}",
             f"its {len(mesh.faces):,} triangles do not fit the memory that the bands leave free on the "
@@ -161,7 +236,7 @@ def _check_memory(board: Board, name: str, scene: Scene, buffer: BandBuffer, tab
 
 def least_cycles(drawing: Drawing) -> int:
     """Least cycles to draw a frame: cycles for its vertices, and for its triangles in every band."""
-    return 3 * drawing.mesh.triangles * drawing.bands + 30 * drawing.mesh.vertices
+    return 3 * drawing.mesh.triangles * drawing.bands + drawing.transform.cycles * drawing.mesh.vertices
 
 
 class BoardTop(Elaboratable):

@@ -140,7 +140,7 @@ class Albedo:
         textures : sequence of TextureDescriptor
             Texture of each material; only with textures.
         texels : LoadedTextures, optional
-            Contents of the texel memory; only with textures.
+            Contents of the texel memory; only with textures. By default the texels that are fixed.
 
         Returns
         -------
@@ -155,6 +155,7 @@ class Albedo:
         if self.texture is None:
             assert found.colors is not None
             return found.colors
+        texels = texels or self.texture.memory.fixed
         if texels is None or not textures:
             raise ValueError("an albedo with textures needs texels and a texture of each material")
         assert found.coordinates is not None

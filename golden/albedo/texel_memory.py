@@ -150,17 +150,20 @@ class TexelMemory:
         Words of each bank, `LEAST` to `LARGEST`.
     external : bool
         Whether the memory is outside of the design, behind streams of requests and responses.
+    fixed : LoadedTextures or None
+        Contents that are fixed at build time. ``None``: the texels are written.
 
     Raises
     ------
     ValueError
-        If the depth is out of range.
+        If the depth is out of range. If the fixed contents are longer, or the memory is outside.
 
     Source: docs/theory/textures.md#memory; not in the documents.
     """
 
     depth: int = 1536
     external: bool = False
+    fixed: LoadedTextures | None = None
 
     CHANNEL_BITS = 12
     COARSE_SHIFT = 3
@@ -173,6 +176,25 @@ class TexelMemory:
             raise ValueError(
                 f"a bank of texels must have {self.LEAST} to {self.LARGEST} words, not {self.depth}"
             )
+        if self.fixed is not None and (self.external or len(self.fixed.codes) > self.depth):
+            raise ValueError("fixed texels must be inside, and at most as many as the memory has words")
+
+    @classmethod
+    def holding(cls, textures: Sequence[Texture]) -> "TexelMemory":
+        """The smallest memory that holds some textures, with the textures fixed at build time.
+
+        Raises
+        ------
+        ValueError
+            As `load`.
+        """
+        loaded = cls(cls.LARGEST).load(textures)
+        return cls(max(len(loaded.codes), cls.LEAST), fixed=loaded)
+
+    @property
+    def written(self) -> bool:
+        """Whether texels are written by frame constants."""
+        return not self.external and self.fixed is None
 
     @property
     def address_bits(self) -> int:

@@ -13,6 +13,7 @@ from blysk.golden.frame_constants import FrameConstants
 from blysk.golden.lighting.intensity import Intensity
 from blysk.golden.pipeline import ShadingPipeline
 from blysk.golden.reference.levels import texel_places
+from blysk.golden.reference.lighting import Material
 from blysk.golden.reference.raster import Raster
 from blysk.golden.reference.scene import Scene
 from blysk.golden.reference.texture import Texture
@@ -22,6 +23,8 @@ __all__ = [
     "albedo_of",
     "check_albedo",
     "design_for",
+    "fixed_albedo_of",
+    "one_level",
     "span_attributes",
     "with_albedo",
 ]
@@ -57,6 +60,57 @@ def albedo_of(scene: Scene) -> Albedo | None:
         perspective=scene.camera.projection == "perspective",
         tints=any(of.tinted for of in scene.materials),
     )
+
+
+def fixed_albedo_of(scene: Scene, has_highlights: bool = True) -> Albedo | None:
+    """The albedo path for a scene whose texels are fixed at build time, and whose spans bring 1/W.
+
+    Parameters
+    ----------
+    scene : Scene
+        The scene.
+    has_highlights : bool
+        Whether the design has highlights. Only then materials may be tinted.
+
+    Raises
+    ------
+    ValueError
+        If the textures do not fit the largest texel memory.
+    """
+    found = albedo_of(scene)
+    if found is None:
+        return None
+    found = replace(found, perspective=True, tints=found.tints and has_highlights)
+    if found.texture is None:
+        return found
+    memory = TexelMemory.holding(_textures(scene))
+    return replace(found, texture=replace(found.texture, memory=memory))
+
+
+def one_level(scene: Scene, level: int = 0) -> Scene:
+    """The scene with one level of each texture as its image, and no other levels.
+
+    Parameters
+    ----------
+    scene : Scene
+        The scene. An image that has fewer levels has its last level, also if the texture takes none.
+    level : int
+        Number of the level, 0 for the image itself.
+    """
+    images: dict[int, np.ndarray] = {}
+
+    def of(material: Material) -> Material:
+        texture = material.texture
+        if texture is None:
+            return material
+        full = replace(texture, mipmapped=True)
+        number = min(level, len(full.levels) - 1)
+        # Textures that share an image go on sharing it.
+        image = images.setdefault(id(texture.texels), full.levels[number])
+        alpha = full.alpha_levels[number][..., 0] if texture.alpha.size else texture.alpha
+        return replace(material, texture=replace(texture, texels=image, alpha=alpha, mipmapped=False))
+
+    return replace(scene, material=tuple(map(of, scene.materials)))
 
 
 def design_for(
@@ -129,7 +183,8 @@ def with_albedo(
     Raises
     ------
     ValueError
-        If textures do not fit, or the light on a surface is over the limit of `Intensity`.
+        If textures do not fit, or are not the fixed textures, or the light on a surface is over the limit of
+        `Intensity`.
     """
     albedo = design.albedo
     assert albedo is not None
@@ -145,9 +200,13 @@ def with_albedo(
         emission = Intensity.color(np.array(material.emission if scene.has_albedo else (0, 0, 0)))
         found.append(replace(of, emission=emission, tinted=tinted if albedo.tints else None))
     if albedo.texture is not None:
-        loaded = albedo.texture.memory.load(_textures(scene))
+        memory = albedo.texture.memory
+        loaded = memory.load(_textures(scene))
         found = [replace(of, texture=its) for of, its in zip(found, loaded.descriptors, strict=True)]
-        found[0] = replace(found[0], texels=loaded)
+        if memory.fixed is None:
+            found[0] = replace(found[0], texels=loaded)
+        elif not np.array_equal(loaded.codes, memory.fixed.codes):
+            raise ValueError("the texels of the design are fixed, and the scene has other textures")
     return found
 
 

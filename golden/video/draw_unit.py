@@ -86,6 +86,8 @@ class Drawing:
     ValueError
         If the design is made for another size, or the numbers of lists, presets and frames differ from the
         controls'. If a command goes past the end of the slots, the materials, the vertices or the triangles.
+        If the mesh brings other attributes of the surface than the vertex unit and the renderer take, or
+        texels are not fixed.
 
     Source: docs/theory/video.md#bands; [T] figure 4.10.
     """
@@ -108,6 +110,12 @@ class Drawing:
                 f"the design has {design.x_bits} and {design.y_bits} bits of a place, a band of "
                 f"{self.size[0]}x{self.lines} has {bits[0]} and {bits[1]}"
             )
+        taken = self.renderer.geometry.surface
+        if not self.mesh.surface == self.transform.surface == taken:
+            raise ValueError("the mesh brings other attributes of the surface than the design takes")
+        albedo = design.albedo
+        if albedo is not None and albedo.texture is not None and albedo.texture.memory.fixed is None:
+            raise ValueError("the texels of a drawing must be fixed in the design")
         wanted = self.controls.materials * self.controls.lights
         if {len(self.commands.starts), len(self.presets), len(self.frames)} != {wanted}:
             raise ValueError(f"the controls choose from {wanted} lists, but there are {len(self.presets)}")
@@ -134,7 +142,8 @@ class Drawing:
         """Drawing of a scene's mesh, which turns around its own middle.
 
         For a method that takes vectors the matrices turn normals into the frame of the scene's light. Scenes
-        with the same frame share their matrices.
+        with the same frame share their matrices. The design needs the albedo path of the scenes, see
+        `fixed_albedo_of`. All textures have level 0 only.
 
         Parameters
         ----------
@@ -158,16 +167,20 @@ class Drawing:
         ------
         ValueError
             If a scene does not fit the design, the mesh the memory, or the camera the matrix. If triangles do
-            not serve the design, see `Renderer`.
+            not serve the design, see `Renderer`. If a texture has several levels, or its coordinates do not
+            fit, see `MeshMemory.of`.
         """
         scene, transform = scenes[0], transform or VertexTransform()
         design = design or board_design(max(len(each.lights) for each in scenes), len(scene.materials))
         size = scene.width, scene.height
         x_bits, y_bits = cls.place_bits(size, lines)
         design = replace(design, x_bits=x_bits, y_bits=y_bits)
-        if design.albedo is not None:
-            raise ValueError("a mesh in memory has no vertex colours and no textures; leave out the albedo")
-        renderer, mesh = Renderer(design), MeshMemory.of([scene.mesh])
+        if any(texture.mipmapped for texture in scene.textures.values()):
+            raise ValueError("a mesh in memory takes level 0 of a texture; leave out the other levels")
+        renderer = Renderer(design)
+        surface = renderer.geometry.surface
+        mesh = MeshMemory.of([scene.mesh], surface, scene.textures)
+        transform = replace(transform, surface=surface)
         given = [triangle_axes(each, design) for each in scenes]
         turned_to = [np.eye(3) if axes is None else axes for axes in given]
         axes, sets = np.unique(np.stack(turned_to), axis=0, return_inverse=True)
@@ -210,6 +223,7 @@ class Drawing:
         """All vertices on the screen, at the code of an angle, by the matrices of a list."""
         words = self.commands.compute(self.commands.starts[preset], True)
         transforms = words[words[:, 0] == KINDS.index("transform")]
+        given = self.mesh.attributes
         # A part that the list does not transform is not drawn.
         slots = dict(zip(transforms[:, 2].tolist(), transforms[:, 1].tolist(), strict=True))
         made = [
@@ -217,11 +231,12 @@ class Drawing:
                 self.mesh.position[part.first : part.first + part.count],
                 self.mesh.normal[part.first : part.first + part.count],
                 self.motion.matrix(slots.get(part.first, 0), angle),
+                None if given is None else given[part.first : part.first + part.count],
             )
             for part in self.mesh.parts
         ]
-        names = ("x", "y", "depth", "normal", "outside")
-        return ScreenVertices(*(np.concatenate([getattr(part, name) for part in made]) for name in names))
+        parts = [part.beats for part in made]
+        return ScreenVertices(**{name: np.concatenate([part[name] for part in parts]) for name in parts[0]})
 
     def triangles(self, angle: int, preset: int, rows: FrameSettings) -> tuple[Triangles, dict[str, int]]:
         """Triangles of some scanlines, and the counters of the assembly."""

@@ -4,14 +4,21 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from blysk.golden.albedo.attribute_spans import AttributeSpans
 from blysk.golden.geometry.triangles import ATTRIBUTE, DEPTH, GRID, Grid, Triangles
 from blysk.golden.video.mesh_memory import MeshMemory
 from blysk.golden.video.vertex_unit import ScreenVertices
 
-__all__ = ["COUNTERS", "TriangleAssembly"]
+__all__ = ["COUNTERS", "TriangleAssembly", "screen_bits"]
 
 COUNTERS = ("sent", "rejected", "outside")
 """Counters: triangles sent, rejected by y, and dropped because a corner is outside."""
+
+
+def screen_bits(grid: Grid = GRID, surface: AttributeSpans | None = None) -> int:
+    """Bits of a screen vertex, with the attributes of a surface and their 1/W."""
+    words = 3 + (0 if surface is None else surface.attributes + 1)
+    return 2 * grid.bits + DEPTH.width + words * ATTRIBUTE.width + 1
 
 
 @dataclass(frozen=True)
@@ -21,6 +28,8 @@ class TriangleAssembly:
     A triangle is *rejected* if no scanline from ``top`` to ``bottom - 1`` has its centre between the highest
     corner (included) and the lowest corner (excluded). These are exactly the triangles that `VertexSort`
     would find empty by y.
+
+    A triangle with texture coordinates has the base and the range of its material, and level 0.
 
     Parameters
     ----------
@@ -38,7 +47,7 @@ class TriangleAssembly:
     @property
     def screen_bits(self) -> int:
         """Bits of a screen vertex."""
-        return 2 * self.grid.bits + DEPTH.width + 3 * ATTRIBUTE.width + 1
+        return screen_bits(self.grid, self.mesh.surface)
 
     def compute(
         self,
@@ -68,13 +77,20 @@ class TriangleAssembly:
         outside = vertices.outside[corners].any(axis=1)
         covered = np.maximum(low, top) < np.minimum(high, bottom)
         kept = corners[covered & ~outside]
+        kinds = np.repeat(material, count)[covered & ~outside]
+        placed: dict[str, np.ndarray] = {}
+        if (placement := self.mesh.placement) is not None:
+            of_kind = placement[np.minimum(kinds, len(placement) - 1)]
+            placed = {"base": of_kind[:, :2], "range": of_kind[:, 2], "level": np.zeros(len(kept), np.int64)}
         triangles = Triangles(
             x=vertices.x[kept],
             y=vertices.y[kept],
             depth=vertices.depth[kept],
             normal=vertices.normal[kept],
-            material=np.repeat(material, count)[covered & ~outside],
+            material=kinds,
             two_sided=np.zeros(len(kept), dtype=bool),
+            surface=None if vertices.surface is None else vertices.surface[kept],
+            **placed,
         )
         counts = {
             "sent": len(kept),

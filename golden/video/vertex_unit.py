@@ -4,19 +4,24 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from blysk.golden.albedo.attribute_spans import AttributeSpans
 from blysk.golden.geometry.reciprocal import Reciprocal
+from blysk.golden.geometry.surface_words import SurfaceWords
 from blysk.golden.geometry.triangles import ATTRIBUTE, DEPTH, GRID, Grid
 from blysk.golden.geometry.wide_product import LOST, wide_product
 from blysk.golden.number.fixed import SQ, UQ, Fixed, Format
 from blysk.golden.number.unit_vector import COMPONENT, ONE
 
-__all__ = ["ENTRY", "OFFSET", "Matrix", "ScreenVertices", "VertexTransform"]
+__all__ = ["ENTRY", "OFFSET", "WEIGHT", "Matrix", "ScreenVertices", "VertexTransform"]
 
 ENTRY = SQ(2, 16)
 """Number format of an entry of a matrix."""
 
 OFFSET = SQ(5, 20)
 """Number format of an offset, in units of the near plane's distance."""
+
+WEIGHT = round(SurfaceWords.LARGEST * 2**COMPONENT.fraction_bits)
+"""Code of `COMPONENT` that an attribute of 1 has in a memory of vertices."""
 
 
 @dataclass(frozen=True)
@@ -58,6 +63,8 @@ class ScreenVertices:
     outside : bool array, shape (V,)
         Whether the vertex is nearer than the near plane, outside the grid, or at least `VertexTransform.FAR`
         times as far as the near plane. Its other words are then invalid.
+    surface : int64 array, shape (V, S), optional
+        Vertex colours and texture coordinates over W, then 1/W, codes of `ATTRIBUTE`, see `SurfaceWords`.
     """
 
     x: np.ndarray
@@ -65,11 +72,12 @@ class ScreenVertices:
     depth: np.ndarray
     normal: np.ndarray
     outside: np.ndarray
+    surface: np.ndarray | None = None
 
     @property
     def beats(self) -> dict[str, np.ndarray]:
         """Output beats of the hardware, by field."""
-        return dict(vars(self))
+        return {name: value for name, value in vars(self).items() if value is not None}
 
 
 @dataclass(frozen=True)
@@ -95,15 +103,18 @@ class VertexTransform:
     N'           SQ(1, 17)    rounded, saturates to ONE
     r'           UQ(1, 16)    r rounded for the multiplier
     N/W          SQ(1, 23)    ``N' r' 2^-s``, rounded to 26 fraction bits before the shift, then cut
+    A            SQ(1, 17)    attribute of the surface, times `SurfaceWords.LARGEST`
+    A/W, 1/W     SQ(1, 23)    ``A r' 2^-s`` as N/W; 1/W is that of ``A = 1``
     ============ ============ =====================================================================
 
     Error bounds, for the given entries, are derived in docs/theory/bounds.md#vertices:
 
     - `ERROR` steps of the grid for a coordinate of a vertex inside;
     - `DEPTH_ERROR` for the depth;
-    - `NORMAL_ERROR` for a component of N/W.
+    - `NORMAL_ERROR` for a component of N/W;
+    - `surface_error` for an attribute, as the quotient of its word and that of 1/W.
 
-    The unit takes 29 multiplications.
+    The unit takes 29 multiplications. Attributes take a multiplication each, and their 1/W takes another.
 
     Parameters
     ----------
@@ -111,6 +122,8 @@ class VertexTransform:
         1 in X/W is ``2^scale_bits`` pixels; 4 to 11. 9 is for pictures up to 1024 pixels wide.
     grid : Grid
         Fraction bits of the coordinates.
+    surface : AttributeSpans, optional
+        Attributes of the surface that vertices bring.
 
     Raises
     ------
@@ -122,6 +135,7 @@ class VertexTransform:
 
     scale_bits: int = 9
     grid: Grid = field(default_factory=lambda: GRID)
+    surface: AttributeSpans | None = None
 
     SPACE = SQ(6, 25)
     SHIFTS = 3
@@ -138,6 +152,17 @@ class VertexTransform:
             raise ValueError(f"scale_bits must be 4 to 11, not {self.scale_bits!r}")
 
     @property
+    def cycles(self) -> int:
+        """Cycles from a vertex to the next with a single multiplier."""
+        return 30 + (0 if self.surface is None else self.surface.attributes + 1)
+
+    @staticmethod
+    def surface_error(w: np.ndarray) -> np.ndarray:
+        """Bound of the error of attributes from -1 to 1 at vertices with W; docs/theory/video.md#vertices."""
+        found: np.ndarray = 2.0**-18 / SurfaceWords.LARGEST + 2.26 * 2.0**-23 * w
+        return found
+
+    @property
     def place(self) -> Format:
         """Number format of x and y, as X/W and Y/W, with the steps of the grid."""
         return self.grid.coordinate.scaled(-self.scale_bits)
@@ -151,7 +176,13 @@ class VertexTransform:
             total = total + product
         return total.round_half_up(self.SPACE.fraction_bits).wrap(self.SPACE)
 
-    def compute(self, position: np.ndarray, normal: np.ndarray, matrix: Matrix) -> ScreenVertices:
+    def compute(
+        self,
+        position: np.ndarray,
+        normal: np.ndarray,
+        matrix: Matrix,
+        attributes: np.ndarray | None = None,
+    ) -> ScreenVertices:
         """Bit-accurate vertices on the screen.
 
         Parameters
@@ -160,6 +191,8 @@ class VertexTransform:
             Codes of ``SQ(1, 17)``.
         matrix : Matrix
             The matrix.
+        attributes : int64 array, shape (V, A), optional
+            Attributes of the surface times `SurfaceWords.LARGEST`, codes of ``SQ(1, 17)``.
         """
         space = self.space(position, matrix)
         w = space.codes[:, 2]
@@ -179,14 +212,24 @@ class VertexTransform:
             outside = outside | (place.codes != rounded.codes)
             places.append(place.codes)
         factor = r.round_half_up(self.FACTOR_FORMAT.fraction_bits).wrap(self.FACTOR_FORMAT)
-        turned = self._normals(normal, matrix)
-        scaled = (turned * factor[:, np.newaxis]).round_half_up(26).codes >> shift[:, np.newaxis]
+
+        def over_w(words: Fixed) -> np.ndarray:
+            scaled = (words * factor[:, np.newaxis]).round_half_up(26).codes >> shift[:, np.newaxis]
+            cut: np.ndarray = scaled >> (26 - ATTRIBUTE.fraction_bits)
+            return cut
+
+        surface = None
+        if self.surface is not None:
+            assert attributes is not None
+            words = np.column_stack([attributes, np.full(len(position), WEIGHT)])
+            surface = over_w(Fixed(COMPONENT, words))
         return ScreenVertices(
             x=places[0],
             y=places[1],
             depth=(one - (r.codes >> shift)) >> (25 - DEPTH.width),
-            normal=scaled >> (26 - ATTRIBUTE.fraction_bits),
+            normal=over_w(self._normals(normal, matrix)),
             outside=outside,
+            surface=surface,
         )
 
     def _normals(self, normal: np.ndarray, matrix: Matrix) -> Fixed:

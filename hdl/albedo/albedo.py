@@ -92,7 +92,7 @@ class AlbedoUnit(wiring.Component):
     constants : :py:`In(descriptor_shape())`
         The texture, constant while spans are inside. Only with textures.
     write : :py:`In(stream.Signature(texel_write_shape()))`
-        Writes of texels, while no span is inside. Only with a texel memory inside.
+        Writes of texels, while no span is inside. Only with a texel memory inside that is not fixed.
     request, response
         Those of `TextureSamplerUnit`, with a texel memory outside.
 
@@ -128,7 +128,7 @@ class AlbedoUnit(wiring.Component):
             if p.texture.memory.external:
                 members["request"] = Out(stream.Signature(texel_request_shape(p.texture.memory)))
                 members["response"] = In(stream.Signature(texels_shape()))
-            else:
+            elif p.texture.memory.written:
                 members["write"] = In(stream.Signature(texel_write_shape()))
         if p.has_product:
             self._product = _ColorProductUnit(initiation_interval)
@@ -158,7 +158,7 @@ class AlbedoUnit(wiring.Component):
         if self.model.texture.memory.external:
             connect(m, sampler.request, wiring.flipped(self.request))
             connect(m, wiring.flipped(self.response), sampler.response)
-        else:
+        elif self.model.texture.memory.written:
             connect(m, wiring.flipped(self.write), sampler.write)
         if self._product is None:
             m.d.comb += [sampler.i.valid.eq(found.valid), found.ready.eq(sampler.i.ready)]

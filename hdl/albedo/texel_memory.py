@@ -1,5 +1,6 @@
 """Texel memory: four banks of texels behind a stream of requests and a stream of texels."""
 
+import numpy as np
 from amaranth.hdl import Cat, Signal, Value, unsigned
 from amaranth.lib import data, stream
 from amaranth.lib.memory import Memory
@@ -32,7 +33,8 @@ class TexelMemoryUnit(PipelinedUnit):
     A write is taken on every cycle. A write with ``begins`` gives an address, divided by 2. The values after
     it are halves of words, first the lower half. The words go to banks 0, 1, 2, 3, then to the next address.
     Values past the end of the banks must not come. Reset begins at address 0, and clears no word. Write only
-    while no request is inside, because the registers stand still on the cycle of a write.
+    while no request is inside, because the registers stand still on the cycle of a write. If the texels are
+    fixed at build time, there are no writes.
 
     Parameters
     ----------
@@ -46,7 +48,7 @@ class TexelMemoryUnit(PipelinedUnit):
     o : :py:`Out(stream.Signature(texels_shape()))`
         Texels.
     write : :py:`In(stream.Signature(texel_write_shape()))`
-        Writes. Always ready.
+        Writes. Always ready. Only if the texels are not fixed.
 
     Source: docs/theory/textures.md#memory.
     """
@@ -57,7 +59,7 @@ class TexelMemoryUnit(PipelinedUnit):
             texel_request_shape(p),
             texels_shape(),
             latency=2,
-            ports={"write": In(stream.Signature(texel_write_shape()))},
+            ports={"write": In(stream.Signature(texel_write_shape()))} if p.fixed is None else {},
         )
 
     def elaborate(self, platform):
@@ -65,6 +67,15 @@ class TexelMemoryUnit(PipelinedUnit):
         p = self.model
         self._words = [Signal(p.WORD_BITS, name=f"texel_{bank}") for bank in range(BANKS)]
         m = super().elaborate(platform)
+        if p.fixed is not None:
+            words = np.zeros((p.depth, BANKS), dtype=np.int64)
+            words[: len(p.fixed.codes)] = p.fixed.words
+            for number, found in enumerate(self._words):
+                init = words[:, number].tolist()
+                m.submodules[f"bank_{number}"] = memory = Memory(shape=p.WORD_BITS, depth=p.depth, init=init)
+                word, _ = registered_read(m, memory, self.i.payload[number], self.advance)
+                m.d.comb += found.eq(word)
+            return m
         lower, upper = Signal(18, name="lower"), Signal(name="upper")
         bank, address = Signal(range(BANKS), name="bank"), Signal(p.address_bits, name="address")
         value, writes = self.write.payload.value, Signal(name="writes")

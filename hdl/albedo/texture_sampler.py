@@ -52,7 +52,7 @@ class TextureSamplerUnit(wiring.Component):
     constants : :py:`In(descriptor_shape())`
         The texture, constant while samples are inside.
     write : :py:`In(stream.Signature(texel_write_shape()))`
-        Writes of the memory, see `TexelMemoryUnit`. Only if the memory is inside.
+        Writes of the memory, see `TexelMemoryUnit`. Only if the memory is inside, and not fixed.
     request : :py:`Out(stream.Signature(texel_request_shape(model.memory)))`
         Requests. Only if the memory is outside.
     response : :py:`In(stream.Signature(texels_shape()))`
@@ -84,7 +84,7 @@ class TextureSamplerUnit(wiring.Component):
         if p.memory.external:
             members["request"] = Out(stream.Signature(texel_request_shape(p.memory)))
             members["response"] = In(stream.Signature(texels_shape()))
-        else:
+        elif p.memory.written:
             members["write"] = In(stream.Signature(texel_write_shape()))
         super().__init__(members)
 
@@ -100,7 +100,8 @@ class TextureSamplerUnit(wiring.Component):
         else:
             m.submodules.memory = memory = self._memory
             request, response = memory.i, memory.o
-            connect(m, wiring.flipped(self.write), memory.write)
+            if p.memory.written:
+                connect(m, wiring.flipped(self.write), memory.write)
         weight = stream.Signature(address.o.payload.shape().members["weight"])
         waits, follows = weight.create(path=("waits",)), weight.create(path=("follows",))
         connect_wide_fifo(m, "weights", waits, follows, self._waiting if p.memory.external else _INSIDE)

@@ -52,7 +52,7 @@ class DrawUnit(wiring.Component):
     A frame takes the renderer's cycles, and these cycles:
 
     - 3 for each triangle in each band;
-    - 30 for each vertex;
+    - `VertexTransform.cycles` for each vertex;
     - 150 for each mesh;
     - `BandDepth.swept` for each band, if the next band is requested at once.
 

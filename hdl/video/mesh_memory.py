@@ -35,7 +35,7 @@ class MeshMemoryUnit(wiring.Component):
     -------
     i : :py:`In(stream.Signature(range_shape()))`
         Ranges.
-    o : :py:`Out(stream.Signature(mesh_vertex_shape(index_bits)))`
+    o : :py:`Out(stream.Signature(mesh_vertex_shape(index_bits, surface)))`
         Vertices of the ranges.
 
     Source: docs/theory/video.md#vertices; not in the documents.
@@ -48,7 +48,7 @@ class MeshMemoryUnit(wiring.Component):
         super().__init__(
             {
                 "i": In(stream.Signature(range_shape())),
-                "o": Out(stream.Signature(mesh_vertex_shape(model.index_bits))),
+                "o": Out(stream.Signature(mesh_vertex_shape(model.index_bits, model.surface))),
             }
         )
 
@@ -57,7 +57,7 @@ class MeshMemoryUnit(wiring.Component):
         m = Module()
         given = self.model
         m.submodules.vertices = memory = Memory(
-            shape=given.VERTEX_BITS, depth=given.vertices, init=given.vertex_words
+            shape=given.vertex_bits, depth=given.vertices, init=given.vertex_words
         )
         read = memory.read_port()
         left, address = (

@@ -42,9 +42,9 @@ class TriangleAssemblyUnit(wiring.Component):
     -------
     i : :py:`In(stream.Signature(draw_shape()))`
         Ranges of triangles.
-    o : :py:`Out(stream.Signature(triangle_shape(grid)))`
+    o : :py:`Out(stream.Signature(triangle_shape(grid, surface)))`
         The triangles to draw.
-    write : :py:`In(stream.Signature({"index", "vertex": screen_vertex_shape(grid)}))`
+    write : :py:`In(stream.Signature({"index", "vertex": screen_vertex_shape(grid, surface)}))`
         Vertices of the frame, one a cycle, while no triangle is read.
     constants : :py:`In(band_rows_shape())`
         The band, constant while triangles are read.
@@ -63,12 +63,13 @@ class TriangleAssemblyUnit(wiring.Component):
 
     def __init__(self, model: TriangleAssembly):
         self.model = model
-        vertex = screen_vertex_shape(model.grid)
+        surface = model.mesh.surface
+        vertex = screen_vertex_shape(model.grid, surface)
         index = unsigned(model.mesh.index_bits)
         super().__init__(
             {
                 "i": In(stream.Signature(draw_shape())),
-                "o": Out(stream.Signature(triangle_shape(model.grid))),
+                "o": Out(stream.Signature(triangle_shape(model.grid, surface))),
                 "write": In(stream.Signature(data.StructLayout({"index": index, "vertex": vertex}))),
                 "constants": In(band_rows_shape()),
                 "status": Out(counters_shape(*COUNTERS)),
@@ -191,11 +192,13 @@ class TriangleAssemblyUnit(wiring.Component):
             m.d.sync += valid.eq(judged & covered & ~outside)
             # All corners are there a cycle before the test of the band has a result.
             with m.If(found["whole"]):
+                names = [name for name in found["corners"][0].shape().members if name != "outside"]
                 for k, corner in enumerate(found["corners"]):
-                    m.d.sync += [
-                        copy(result[name][k], corner[name]) for name in ("x", "y", "depth", "normal")
-                    ]
+                    m.d.sync += [copy(result[name][k], corner[name]) for name in names]
                 m.d.sync += result.material.eq(found["material"])
+                if (placement := self.model.mesh.placement) is not None:
+                    for to, codes in zip((*result.base, result.range), placement.T.tolist(), strict=True):
+                        m.d.sync += Value.cast(to).eq(Array(codes)[found["material"]])
         moves = advance & judged
         count_events(
             m,

@@ -3,10 +3,11 @@
 from amaranth.hdl import Cat, Const, Mux, Signal, Value, unsigned
 from amaranth.lib import data
 
+from blysk.golden.albedo.attribute_spans import AttributeSpans
 from blysk.golden.geometry.reciprocal import Reciprocal
 from blysk.golden.geometry.triangles import ATTRIBUTE, DEPTH, GRID, Grid
 from blysk.golden.number.unit_vector import COMPONENT, ONE
-from blysk.golden.video.vertex_unit import ENTRY, OFFSET, VertexTransform
+from blysk.golden.video.vertex_unit import ENTRY, OFFSET, WEIGHT, VertexTransform
 from blysk.hdl.core.dataflow import Dataflow
 from blysk.hdl.core.fixed import FixedShape, FixedValue
 from blysk.hdl.core.pipelined_unit import PipelinedUnit
@@ -14,6 +15,7 @@ from blysk.hdl.core.shapes import normal_shape
 from blysk.hdl.core.views import copy
 from blysk.hdl.core.word import Word
 from blysk.hdl.geometry.reciprocal import reciprocal_word, shared_table
+from blysk.hdl.geometry.surface_words import surface_count
 from blysk.hdl.geometry.wide_product import wide_product
 
 __all__ = ["VertexUnit", "matrix_shape", "mesh_vertex_shape", "screen_vertex_shape"]
@@ -27,15 +29,17 @@ def matrix_shape() -> data.StructLayout:
     )
 
 
-def mesh_vertex_shape(index_bits: int) -> data.StructLayout:
-    """Shape of a vertex of the mesh memory, with its index."""
-    return data.StructLayout(
-        {"index": unsigned(index_bits), "position": normal_shape(), "normal": normal_shape()}
-    )
+def mesh_vertex_shape(index_bits: int, surface: AttributeSpans | None = None) -> data.StructLayout:
+    """Shape of a vertex of the mesh memory, with its index, and its attributes of a surface."""
+    vertex = {"index": unsigned(index_bits), "position": normal_shape(), "normal": normal_shape()}
+    if surface is not None:
+        vertex["attributes"] = data.ArrayLayout(FixedShape(COMPONENT), surface.attributes)
+    return data.StructLayout(vertex)
 
 
-def screen_vertex_shape(grid: Grid = GRID) -> data.StructLayout:
+def screen_vertex_shape(grid: Grid = GRID, surface: AttributeSpans | None = None) -> data.StructLayout:
     """Shape of `ScreenVertices.beats`."""
+    words = data.ArrayLayout(FixedShape(ATTRIBUTE), surface_count(surface))
     return data.StructLayout(
         {
             "x": FixedShape(grid.coordinate),
@@ -43,6 +47,7 @@ def screen_vertex_shape(grid: Grid = GRID) -> data.StructLayout:
             "depth": FixedShape(DEPTH),
             "normal": data.ArrayLayout(FixedShape(ATTRIBUTE), 3),
             "outside": unsigned(1),
+            **({} if surface is None else {"surface": words}),
         }
     )
 
@@ -50,7 +55,8 @@ def screen_vertex_shape(grid: Grid = GRID) -> data.StructLayout:
 class VertexUnit(PipelinedUnit):
     """Transforms vertices. `VertexTransform` is the bit-accurate model.
 
-    The latency is the attribute ``latency``. With one multiplier the initiation interval is 30 cycles.
+    The latency is the attribute ``latency``. With one multiplier the initiation interval is
+    `VertexTransform.cycles`.
 
     Parameters
     ----------
@@ -58,14 +64,15 @@ class VertexUnit(PipelinedUnit):
         Bit-accurate model.
     index_bits : int
         Bits of the index that goes with a vertex.
-    initiation_interval : int
-        Cycles from a vertex to the next, 15 or more. An interval of 15 takes two multipliers.
+    initiation_interval : int, optional
+        Cycles from a vertex to the next, 15 or more. An interval of 15 takes two multipliers. By default
+        those of one multiplier.
 
     Members
     -------
-    i : :py:`In(stream.Signature(mesh_vertex_shape(index_bits)))`
+    i : :py:`In(stream.Signature(mesh_vertex_shape(index_bits, surface)))`
         Vertices of a mesh.
-    o : :py:`Out(stream.Signature(data.StructLayout({"index", "vertex": screen_vertex_shape(grid)})))`
+    o : :py:`Out(stream.Signature({"index", "vertex": screen_vertex_shape(grid, surface)}))`
         The same vertices on the screen.
     constants : :py:`In(matrix_shape())`
         The matrix, constant while vertices are inside.
@@ -74,17 +81,22 @@ class VertexUnit(PipelinedUnit):
     """
 
     def __init__(
-        self, model: VertexTransform | None = None, index_bits: int = 9, initiation_interval: int = 30
+        self,
+        model: VertexTransform | None = None,
+        index_bits: int = 9,
+        initiation_interval: int | None = None,
     ):
+        self.model = model or VertexTransform()
+        initiation_interval = initiation_interval or self.model.cycles
         if initiation_interval < 15:
             raise ValueError(f"initiation_interval must be at least 15, not {initiation_interval}")
-        self.model = model or VertexTransform()
         self._graph = Dataflow(initiation_interval)
         self._results = self._describe()
         self.multipliers = self._graph.multiplier.count
-        vertex = screen_vertex_shape(self.model.grid)
+        surface = self.model.surface
+        vertex = screen_vertex_shape(self.model.grid, surface)
         super().__init__(
-            mesh_vertex_shape(index_bits),
+            mesh_vertex_shape(index_bits, surface),
             data.StructLayout({"index": unsigned(index_bits), "vertex": vertex}),
             latency=max(word.stage for word in self._results.values()),
             initiation_interval=initiation_interval,
@@ -175,16 +187,28 @@ class VertexUnit(PipelinedUnit):
             lambda r: r.round_half_up(p.FACTOR_FORMAT.fraction_bits).wrap(p.FACTOR_FORMAT),
             r,
         )
-        for k in range(3):
-            turned = self._rows(f"normal_{k}", normal, k, _component)
-            scaled = g.multiply(f"scaled_{k}", turned, factor)
-            rounded = g.register(f"scaled_{k}_rounded", lambda v: v.round_half_up(26), scaled)
-            words[f"normal_{k}"] = g.register(
-                f"normal_{k}_word",
+
+        def over_w(name, scaled, read):
+            rounded = g.register(f"scaled_{name}_rounded", lambda v: v.round_half_up(26), scaled)
+            words[read] = g.register(
+                f"{read}_word",
                 lambda v, s: (Value.cast(v) >> s)[26 - ATTRIBUTE.fraction_bits :][: ATTRIBUTE.width],
                 rounded,
                 shift,
             )
+
+        for k in range(3):
+            turned = self._rows(f"normal_{k}", normal, k, _component)
+            over_w(k, g.multiply(f"scaled_{k}", turned, factor), f"normal_{k}")
+        if p.surface is None:
+            return words
+        attributes = g.input("attributes", lambda operands: operands.attributes)
+        for k in range(p.surface.attributes):
+            product = g.multiply(f"surface_{k}_scaled", attributes, factor, lambda v, k=k: v[k])
+            over_w(f"surface_{k}", product, f"surface_{k}")
+        weight = FixedValue(COMPONENT, Const(WEIGHT, COMPONENT.width).as_signed())
+        product = g.multiply("weight_scaled", factor, factor, lambda _: weight)
+        over_w("weight", product, f"surface_{p.surface.attributes}")
         return words
 
     def _over(self, rounded: FixedValue) -> Value:
@@ -206,6 +230,10 @@ class VertexUnit(PipelinedUnit):
             Value.cast(vertex.depth).eq(value["depth"]),
             *(Value.cast(vertex.normal[k]).eq(value[f"normal_{k}"]) for k in range(3)),
             vertex.outside.eq(value["outside"] | value["x_over"] | value["y_over"]),
+            *(
+                Value.cast(vertex.surface[k]).eq(value[f"surface_{k}"])
+                for k in range(surface_count(self.model.surface))
+            ),
         ]
         return result
 

@@ -24,7 +24,7 @@ from blysk.sim.meshes.loaded_mesh import LoadedMesh, merged
 from blysk.sim.meshes.materials import FileMaterial, surfaces
 from blysk.sim.meshes.mesh import given_mesh, load_mesh
 
-__all__ = ["load", "scene", "scenes_of", "warn_of_ignored"]
+__all__ = ["load", "scene", "scenes_of", "warn_of_ignored", "without_albedo"]
 
 # Options that replace the camera of a file.
 _CAMERA = ("projection", "view", "position", "target", "up", "field_of_view")
@@ -176,10 +176,16 @@ def _sees(camera: Camera, mesh: Mesh, size: tuple[int, int]) -> bool:
     return not bool(beyond[:, mesh.faces].all(axis=2).any(axis=0).all())
 
 
-def _without(loaded: LoadedMesh, albedo: bool, cutoffs: bool) -> LoadedMesh:
+def without_albedo(loaded: LoadedMesh, reason: str) -> LoadedMesh:
+    """The mesh without vertex colours and textures; ``ignored`` names them with a reason."""
+    return _without(loaded, True, False, reason)
+
+
+def _without(loaded: LoadedMesh, albedo: bool, cutoffs: bool, reason: str = "") -> LoadedMesh:
     """The mesh without vertex colours and textures, and without cutoffs of alpha; ``ignored`` names them.
 
-    If ``albedo``, the mesh loses vertex colours and textures. If ``cutoffs``, it loses cutoffs of alpha.
+    If ``albedo``, the mesh loses vertex colours and textures, for a reason. If ``cutoffs``, it loses cutoffs
+    of alpha.
     """
     materials, left_out = loaded.materials, []
     mesh: dict[str, Any] = {}
@@ -188,6 +194,7 @@ def _without(loaded: LoadedMesh, albedo: bool, cutoffs: bool) -> LoadedMesh:
         left_out += ["vertex colours"] if len(loaded.mesh.colors) else []
         textures = len({id(material.texture) for material in materials if material.texture is not None})
         left_out += [f"{textures} texture{'s' * (textures > 1)}"] if textures else []
+        left_out = [f"{' and '.join(left_out)} ({reason})"] if reason else left_out
         mesh |= {"colors": np.zeros((0, 3)), "coordinates": np.zeros((0, 2))}
         plain |= {"texture": None, "colored": False}
     if cutoffs and (cut := sum(material.cutoff is not None for material in materials)):

@@ -5,7 +5,7 @@ from functools import partial
 import numpy as np
 
 from blysk.bench.units.record import Case, Record, Stimulus, Variant
-from blysk.golden.albedo.texel_memory import BANKS, TexelMemory
+from blysk.golden.albedo.texel_memory import BANKS, LoadedTextures, TexelMemory
 from blysk.hdl.albedo.texel_memory import TexelMemoryUnit
 
 __all__ = ["RECORD", "loaded_words"]
@@ -24,6 +24,8 @@ def loaded_words(memory, write):
 
 
 def _expect(unit, case):
+    if unit.model.fixed is not None:
+        return unit.model.read(unit.model.fixed, case.beats)
     return loaded_words(unit.model, case.write)[case.beats, np.arange(BANKS)]
 
 
@@ -41,6 +43,17 @@ def _requests(unit, rng, count):
     return Case(rng.integers(0, depth, (count, BANKS)), write={"value": value, "begins": begins})
 
 
+def _fixed(unit, rng, count):
+    """Any addresses of a memory with fixed texels, also behind the last texel."""
+    return Case(rng.integers(0, unit.model.depth, (count, BANKS)))
+
+
+def _fixed_memory() -> TexelMemory:
+    """A memory of 24 words, of which 20 are fixed texels."""
+    codes = np.random.default_rng(2026).integers(0, 1 << TexelMemory.CHANNEL_BITS, (20, BANKS, 3))
+    return TexelMemory(24, fixed=LoadedTextures(codes, ()))
+
+
 RECORD = Record(
     name="texel_memory",
     title="Texels of four banks, a request a cycle",
@@ -48,9 +61,13 @@ RECORD = Record(
     variants={
         "24 words": Variant(partial(TexelMemoryUnit, TexelMemory(24)), note="exact"),
         "1536 words": Variant(partial(TexelMemoryUnit, TexelMemory(1536)), note="exact", long=True),
+        "fixed texels": Variant(partial(TexelMemoryUnit, _fixed_memory()), note="exact", long=True),
     },
     expect=_expect,
-    stimuli={"requests": Stimulus(_requests, 300)},
+    stimuli={
+        "requests": Stimulus(_requests, 300, variants=("24 words", "1536 words")),
+        "fixed": Stimulus(_fixed, 300, variants=("fixed texels",)),
+    },
     axis="",
     waivers={
         "nothing": "In a run writes come without gaps. A test of the unit has writes with gaps.",

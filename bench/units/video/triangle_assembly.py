@@ -6,6 +6,7 @@ import numpy as np
 
 from blysk.bench.units.record import Case, Record, Stimulus, Variant
 from blysk.bench.units.video.meshes import any_memory
+from blysk.golden.albedo.attribute_spans import AttributeSpans
 from blysk.golden.geometry.triangles import ATTRIBUTE, DEPTH
 from blysk.golden.video.triangle_assembly import TriangleAssembly
 from blysk.golden.video.vertex_unit import ScreenVertices
@@ -32,6 +33,9 @@ def _case(unit, rng, count, spread, outside):
         "normal": rng.integers(ATTRIBUTE.min_code, ATTRIBUTE.max_code, (mesh.vertices, 3)),
         "outside": (rng.random(mesh.vertices) < outside).astype(np.int64),
     }
+    if mesh.surface is not None:
+        shape = mesh.vertices, mesh.surface.attributes + 1
+        vertices["surface"] = rng.integers(ATTRIBUTE.min_code, ATTRIBUTE.max_code, shape)
     first = rng.integers(0, mesh.triangles, count)
     size = 1 + (rng.random(count) ** 4 * (mesh.triangles - first)).astype(np.int64)
     first[:2], size[:2] = 0, mesh.triangles
@@ -54,7 +58,12 @@ RECORD = Record(
     title="Triangles of a range that lie in a band, from screen vertices",
     source="[T] figure 4.10",
     variants={
-        "77 triangles": Variant(partial(TriangleAssemblyUnit, TriangleAssembly(any_memory())), note="exact")
+        "77 triangles": Variant(partial(TriangleAssemblyUnit, TriangleAssembly(any_memory())), note="exact"),
+        "colours and coordinates": Variant(
+            partial(TriangleAssemblyUnit, TriangleAssembly(any_memory(surface=AttributeSpans(True, True)))),
+            note="exact",
+            long=True,
+        ),
     },
     expect=lambda unit, case: _made(unit, case)[0].beats,
     status=lambda unit, case: _made(unit, case)[1],

@@ -7,10 +7,11 @@ import numpy as np
 from blysk.bench.units.operands import unit_codes
 from blysk.bench.units.record import Case, Record, Stimulus, Variant
 from blysk.bench.units.sample import Sample
+from blysk.golden.albedo.attribute_spans import AttributeSpans
 from blysk.golden.number.fixed import Fixed
 from blysk.golden.number.unit_vector import COMPONENT, ONE
 from blysk.golden.video.motion import rotation
-from blysk.golden.video.vertex_unit import ENTRY, OFFSET, Matrix, VertexTransform
+from blysk.golden.video.vertex_unit import ENTRY, OFFSET, WEIGHT, Matrix, VertexTransform
 from blysk.hdl.video.vertex_unit import VertexUnit
 
 __all__ = ["RECORD", "any_matrix"]
@@ -33,27 +34,32 @@ def _matrix(constants) -> Matrix:
 
 
 def _expect(unit, case):
-    made = unit.model.compute(case.beats["position"], case.beats["normal"], _matrix(case.constants))
+    given = case.beats["position"], case.beats["normal"], _matrix(case.constants)
+    made = unit.model.compute(*given, case.beats.get("attributes"))
     return {"index": case.beats["index"], "vertex": made.beats}
 
 
-def _case(rng, count, matrix, index_bits):
+def _case(unit, rng, count, matrix):
+    index_bits = len(unit.i.payload.index)
     position = rng.integers(-ONE, ONE + 1, (count, 3))
     ends = rng.random(count) < 0.1
     position[ends] = rng.choice([-ONE, 0, ONE], (ends.sum(), 3))
     beats = {"index": rng.integers(0, 1 << index_bits, count), "position": position}
-    return Case(beats | {"normal": unit_codes(rng, count)}, matrix.codes)
+    beats["normal"] = unit_codes(rng, count)
+    if (surface := unit.model.surface) is not None:
+        beats["attributes"] = rng.integers(-WEIGHT, WEIGHT + 1, (count, surface.attributes))
+    return Case(beats, matrix.codes)
 
 
 def _inside(unit, rng, count):
     """An object before the camera."""
-    return _case(rng, count, any_matrix(rng), len(unit.i.payload.index))
+    return _case(unit, rng, count, any_matrix(rng))
 
 
 def _around(unit, rng, count):
     """An object whose vertices are mostly outside the visible space: too near, too far, or beside it."""
     matrix = any_matrix(rng, distance=rng.choice([0.5, 1.5, 15.5]), size=1.1)
-    return _case(rng, count, matrix, len(unit.i.payload.index))
+    return _case(unit, rng, count, matrix)
 
 
 def _any(unit, rng, count):
@@ -61,7 +67,7 @@ def _any(unit, rng, count):
     most = ENTRY.max_code
     position, normal = rng.integers(-most - 1, most + 1, (2, 3, 3))
     offset = rng.integers(OFFSET.min_code, OFFSET.max_code + 1, 3)
-    return _case(rng, count, Matrix(position, offset, normal), len(unit.i.payload.index))
+    return _case(unit, rng, count, Matrix(position, offset, normal))
 
 
 def _measure(rng, count):
@@ -85,6 +91,9 @@ RECORD = Record(
             VertexUnit, _measure, "vertices inside", note="error of the column, in 1/256 pixel"
         ),
         "two multipliers": Variant(partial(VertexUnit, None, 10, 15), long=True),
+        "colours and coordinates": Variant(
+            partial(VertexUnit, VertexTransform(surface=AttributeSpans(True, True))), long=True
+        ),
     },
     expect=_expect,
     stimuli={

@@ -4,6 +4,7 @@
 import re
 import subprocess
 import sys
+from dataclasses import replace
 from importlib.util import find_spec
 from pathlib import Path
 
@@ -11,15 +12,17 @@ import numpy as np
 import pytest
 from amaranth.hdl import Fragment, Shape
 from amaranth.lib.memory import Memory
+from PIL import Image
 
-from blysk.bench.tools.board import built_lines, missed, planned
+from blysk.bench.tools.board import built_lines, design_lines, missed, planned
 from blysk.bench.tools.board_build import Built, Clock, _stuck, build, refuse_too_large
-from blysk.bench.tools.board_design import BoardTop, gpu_of
+from blysk.bench.tools.board_design import BoardTop, _free_blocks, gpu_of
 from blysk.bench.tools.boards import BOARDS
 from blysk.bench.tools.place_and_route import tool_versions
 from blysk.bench.tools.tool_runner import TooLarge, ToolError
+from blysk.golden.albedo.attribute_spans import AttributeSpans
 from blysk.golden.reference.light import Light
-from blysk.golden.video.band_buffer import BandBuffer
+from blysk.golden.video.band_buffer import RGB888, BandBuffer
 from blysk.golden.video.clock_plan import clock_plan
 from blysk.golden.video.display_timing import VGA
 from blysk.golden.video.mesh_memory import block_rams
@@ -130,11 +133,45 @@ def test_lights_of_the_presets():
     assert scenes[3].lights == scenes[2].lights
 
 
-def test_contents_of_a_file_that_a_board_does_not_draw_are_told(tmp_path):
-    text = "v 0 0 0 1 0 0\nv 1 0 0 0 1 0\nv 0 1 0 0 0 1\nf 1 2 3\n"
-    (tmp_path / "a.obj").write_text(text)
-    with pytest.warns(RuntimeWarning, match="a is drawn without: vertex colours"):
-        gpu_of(BOARDS["ulx3s-85f"], str(tmp_path / "a.obj"), {})
+def painted(folder, side=16):
+    """OBJ files of a triangle with vertex colours, and of a triangle with an image."""
+    (folder / "a.obj").write_text("v 0 0 0 1 0 0\nv 1 0 0 0 1 0\nv 0 1 0 0 0 1\nf 1 2 3\n")
+    corners = "v 0 0 0\nv 1 0 0\nv 0 1 0\nvt 0 0\nvt 1 0\nvt 0 1\n"
+    (folder / "b.obj").write_text(f"mtllib b.mtl\nusemtl b\n{corners}f 1/1 2/2 3/3\n")
+    (folder / "b.mtl").write_text("newmtl b\nmap_Kd b.png\n")
+    Image.effect_noise((side, side), 90).convert("RGB").save(folder / "b.png")
+    return str(folder / "a.obj"), str(folder / "b.obj")
+
+
+def test_colours_are_drawn_if_there_is_room(tmp_path):
+    """Boards with a 25F tell why they leave them out."""
+    colours, _ = painted(tmp_path)
+    drawing = gpu_of(BOARDS["ulx3s-85f"], colours, {})[0].drawing
+    assert drawing.mesh.surface == drawing.renderer.geometry.surface == AttributeSpans()
+    told = r"a is drawn without: vertex colours \(the icepi-zero has too few block RAMs for them"
+    with pytest.warns(RuntimeWarning, match=told):
+        gpu_of(BOARDS["icepi-zero"], colours, {})
+
+
+@pytest.mark.ci
+@pytest.mark.long
+def test_textures_are_drawn_if_there_is_room(tmp_path):
+    """An image is halved until it fits. Methods that take no attributes, and full boards, leave it out."""
+    _, image = painted(tmp_path, 64)
+    board = BOARDS["ulx3s-85f"]
+    gpu, scenes = gpu_of(board, image, {})
+    memory = gpu.drawing.renderer.design.albedo.texture.memory
+    np.testing.assert_array_equal(memory.load([scenes[0].material[0].texture]).codes, memory.fixed.codes)
+    assert memory.depth == 32 * 32
+    told = "texture of 64x64 texels, without levels of detail"
+    assert f"surface     {told}" in design_lines(board, image, gpu, pattern_on(board)[1])
+    for options, block_rams_there, told in (
+        ({}, 123, r"details of images \(32 of 64 texels a side fit the ulx3s-85f\)"),
+        ({}, 100, r"1 texture \(the ulx3s-85f has too few block RAMs for them; use ulx3s-85f\)"),
+        ({"method": "renormalise"}, 208, r"1 texture \(hardware geometry has no vertex colours"),
+    ):
+        with pytest.warns(RuntimeWarning, match=f"b is drawn without: {told}"):
+            gpu_of(replace(board, block_rams=block_rams_there), image, options)
 
 
 BUILT = Built(
@@ -253,8 +290,8 @@ def test_bitstream_of_a_pattern():
         build(board, top, {**rates, "serial": 100.0})
 
 
-def test_the_default_of_a_small_board_has_its_block_rams(monkeypatch):
-    """The memories of the whole drawing, each in the fewest block RAMs of one shape, fit the device."""
+def memories_of(gpu, monkeypatch):
+    """Depths and widths of memories of a drawing with 64 words or more. Shorter ones are look-up tables."""
     found, make = [], Memory.__init__
 
     def counted(memory, *arguments, **options):
@@ -262,10 +299,41 @@ def test_the_default_of_a_small_board_has_its_block_rams(monkeypatch):
         found.append((memory.depth, Shape.cast(memory.shape).width))
 
     monkeypatch.setattr(Memory, "__init__", counted)
+    Fragment.get(GpuUnit(gpu), None)
+    return [(depth, width) for depth, width in found if depth >= 64]
+
+
+def test_the_default_of_a_small_board_has_its_block_rams(monkeypatch):
+    """The memories of the whole drawing, each in the fewest block RAMs of one shape, fit the device."""
     board = BOARDS["ulx3s-25f"]
-    Fragment.get(GpuUnit(planned(board, "teapot", {}, None, 52.5)[0]), None)
-    # Shorter memories are look-up tables. So are the coordinates beside shading, see `board_build`.
+    found = memories_of(planned(board, "teapot", {}, None, 52.5)[0], monkeypatch)
+    # The coordinates beside shading are look-up tables, see `board_build`.
     found.remove((64, 25))
-    blocks = [block_rams(depth, width) for depth, width in found if depth >= 64]
+    blocks = [block_rams(depth, width) for depth, width in found]
     assert len(blocks) > 10
     assert sum(blocks) <= board.block_rams
+
+
+@pytest.mark.ci
+@pytest.mark.long
+@pytest.mark.parametrize("parts", [("colors",), ("coordinates",), ("colors", "coordinates")])
+def test_block_rams_of_colours_and_textures(parts, tmp_path, monkeypatch):
+    """The memories of a drawing with colours or a texture are as many block RAMs as the check counts."""
+    painted(tmp_path, 64)
+    rows = [(x, y) for y in range(9) for x in range(9)]
+    red = " {} 0 1" if "colors" in parts else ""
+    lines = ["mtllib b.mtl", "usemtl b"] if "coordinates" in parts else []
+    lines += [f"v {x} {y} 0{red.format(x / 8)}" for x, y in rows]
+    lines += [f"vt {x / 8} {y / 8}" for x, y in rows]
+    corners = [(k, k + 1, k + 10, k, k + 10, k + 9) for k in range(1, 72) if k % 9]
+    lines += [f"f {a}/{a} {b}/{b} {c}/{c}" for two in corners for a, b, c in (two[:3], two[3:])]
+    (tmp_path / "c.obj").write_text("\n".join(lines))
+    board = BOARDS["ulx3s-85f"]
+    gpu, _ = gpu_of(board, str(tmp_path / "c.obj"), {})
+    drawing = gpu.drawing
+    assert drawing.mesh.surface == AttributeSpans(*(name in parts for name in ("colors", "coordinates")))
+    left = _free_blocks(board, drawing.renderer.design, RGB888) - drawing.mesh.blocks(
+        drawing.assembly.screen_bits
+    )
+    found = sum(block_rams(*memory) for memory in memories_of(gpu, monkeypatch))
+    assert found == board.block_rams - left

@@ -62,6 +62,14 @@ def test_several_textures():
             np.testing.assert_array_equal(whole, TexelMemory.encode(image))
 
 
+def test_the_smallest_memory_has_its_textures_fixed():
+    textures = [Texture(np.full((8, 8, 3), 0.5), mipmapped=False), Texture(np.ones((2, 2, 3)))]
+    memory = TexelMemory.holding(textures)
+    assert memory.depth == len(memory.fixed.codes) < 24
+    assert not memory.written
+    np.testing.assert_array_equal(memory.load(textures).codes, memory.fixed.codes)
+
+
 def test_writes():
     texture = Texture(np.arange(12).reshape(2, 2, 3) / 12)
     loaded = MEMORY.load([texture])
@@ -102,6 +110,9 @@ def test_bad_arguments_are_refused():
         TexelMemory(2000).load([Texture(np.zeros((64, 64, 3))) for _ in range(2)])
     with pytest.raises(ValueError, match=r"^a texel memory needs a texture$"):
         MEMORY.load([])
+    for depth, external in ((2, False), (24, True)):
+        with pytest.raises(ValueError, match=r"^fixed texels must be inside"):
+            TexelMemory(depth, external, TexelMemory.holding([Texture(np.zeros((4, 4, 3)))]).fixed)
     for depth in (1, 2**19 + 1):
         with pytest.raises(ValueError, match=rf"^a bank of texels must have 2 to 524288 words, not {depth}$"):
             TexelMemory(depth)

@@ -5,18 +5,22 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from blysk.golden.frames.surface import albedo_of, fixed_albedo_of
 from blysk.golden.geometry.scene_triangles import scene_triangles
 from blysk.golden.presets import preset
 from blysk.golden.reference.camera import Camera
 from blysk.golden.reference.lighting import Light, Material
 from blysk.golden.reference.renderer import render
 from blysk.golden.reference.scene import Scene
+from blysk.golden.reference.texture import Texture
 from blysk.golden.video.controls import Controls
 from blysk.golden.video.draw_commands import KINDS, DrawCommands
-from blysk.golden.video.draw_unit import Drawing, turned
+from blysk.golden.video.draw_unit import Drawing, board_design, turned
+from blysk.golden.video.vertex_unit import VertexTransform
 from blysk.sim.meshes.teapot import teapot
 
 SIZE = 160, 120
+LOOKS = "colors", "coordinates"
 
 
 def scene(triangles=400, size=SIZE, back_faces="cull", distance=1.0):
@@ -164,6 +168,48 @@ def test_commands_of_a_scene():
     wanted = drawing.presets[1][0].writes()
     np.testing.assert_array_equal(writes[:, 1], wanted["address"])
     np.testing.assert_array_equal(writes[:, 2] | writes[:, 3] << 12, wanted["data"])
+
+
+def colored(shown, parts):
+    """The scene with vertex colours and with an image of 16x8 texels, as far as ``parts`` name them."""
+    rng, mesh = np.random.default_rng(4), shown.mesh
+    looks = {"colors": rng.random((len(mesh.vertices), 3)), "coordinates": mesh.vertices[:, :2] * 0.9}
+    mesh = replace(mesh, **{name: value for name, value in looks.items() if name in parts})
+    image = Texture(rng.random((8, 16, 3)), ("repeat", "mirror"), mipmapped=False)
+    texture = image if "coordinates" in parts else None
+    return replace(shown, mesh=mesh, material=replace(shown.material, texture=texture))
+
+
+@pytest.mark.parametrize(
+    "parts", [("colors", "coordinates"), *(pytest.param((p,), marks=pytest.mark.long) for p in LOOKS)]
+)
+def test_colours_and_textures(parts, monkeypatch):
+    """Bands equal the whole frame. With the coordinates of the exact frame no pixel is off by 0.7 LSB."""
+    shown = colored(scene(), parts)
+    design = replace(board_design(), albedo=fixed_albedo_of(shown))
+    drawing = Drawing.of([shown], design, lines=40)
+    whole, image = drawing.whole(700), np.zeros((*SIZE[::-1], 3), dtype=np.uint8)
+    image[whole.y, whole.x] = whole.color
+    np.testing.assert_array_equal(drawing.picture(700), image)
+    assert errors_with_exact_coordinates(drawing, shown, 700, monkeypatch).max() < 0.7
+
+
+def test_colours_that_a_drawing_does_not_take_are_refused():
+    shown = colored(scene(64), LOOKS)
+    design = replace(board_design(), albedo=fixed_albedo_of(shown))
+    texture = replace(shown.material.texture, mipmapped=True)
+    with pytest.raises(ValueError, match="takes level 0 of a texture"):
+        Drawing.of([replace(shown, material=replace(shown.material, texture=texture))], design)
+    with pytest.raises(ValueError, match="the scene has vertex colours, and the design does not"):
+        Drawing.of([shown])
+    with pytest.raises(ValueError, match="the texels of a drawing must be fixed"):
+        Drawing.of([shown], replace(design, albedo=albedo_of(shown)))
+    other = replace(shown.material, texture=replace(shown.material.texture, texels=np.zeros((8, 16, 3))))
+    with pytest.raises(ValueError, match="the texels of the design are fixed"):
+        Drawing.of([shown, replace(shown, material=other)], design)
+    drawing = Drawing.of([shown], design)
+    with pytest.raises(ValueError, match="the mesh brings other attributes"):
+        replace(drawing, transform=VertexTransform())
 
 
 def test_what_does_not_fit_is_refused():

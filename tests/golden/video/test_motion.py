@@ -1,11 +1,17 @@
 """Matrices of turning meshes against a camera in float64."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
+from blysk.golden.albedo.attribute_spans import AttributeSpans
+from blysk.golden.geometry.surface_words import SurfaceWords
 from blysk.golden.number.fixed import Fixed
 from blysk.golden.number.unit_vector import COMPONENT
 from blysk.golden.reference.camera import Camera
+from blysk.golden.reference.geometry import Mesh, normalise
+from blysk.golden.reference.texture import Texture
 from blysk.golden.video.mesh_memory import MeshMemory, block_rams
 from blysk.golden.video.motion import Motion, rotation
 from blysk.golden.video.vertex_unit import VertexTransform
@@ -13,6 +19,8 @@ from blysk.sim.meshes.teapot import teapot
 
 SIZE = 640, 480
 AXIS = 0.2, 1.0, 0.1
+MOVED = (1, 100), (100, 0)
+"""Scales and distances of texture coordinates that are too far from an image, and too far apart."""
 
 
 @pytest.fixture(scope="module")
@@ -84,6 +92,34 @@ def test_the_memory_holds_the_mesh(memory):
     assert np.abs(stored.vertices - mesh.vertices).max() <= half * 2.0**-18 * 1.001
     assert np.degrees(np.arccos(np.clip((stored.normals * mesh.normals).sum(axis=1), -1, 1))).max() < 0.002
     np.testing.assert_array_equal(stored.faces, mesh.faces)
+
+
+def test_the_memory_holds_colours_and_texture_coordinates():
+    """Coordinates stand for texels of the material's image. A vertex of two materials is stored twice."""
+    rng = np.random.default_rng(3)
+    faces = [[0, 1, 2], [2, 1, 3], [1, 2, 3]]
+    looks = {"colors": rng.random((4, 3)), "coordinates": rng.uniform(-1.5, 2.5, (4, 2))}
+    mesh = Mesh(rng.normal(size=(4, 3)), faces, normalise(rng.normal(size=(4, 3))), [0, 0, 1], **looks)
+    images = {0: Texture(np.ones((16, 64, 3))), 1: Texture(np.ones((2, 2, 3)), wrap=("mirror", "repeat"))}
+    found = MeshMemory.of([mesh], AttributeSpans(True, True), images)
+    assert found.vertices == 7
+    assert found.placement.shape == (2, 3)
+    given = found.attributes / (SurfaceWords.LARGEST * 2**17)
+    for _, first, count in found.parts[0].draws:
+        kind = int(first > 0)
+        corners, own = found.faces[first : first + count], mesh.faces[mesh.material == kind]
+        *base, reach = found.placement[kind]
+        np.testing.assert_allclose(given[corners][..., :3], mesh.colors[own], atol=2.0**-17)
+        texels = base + given[corners][..., 3:] * 2.0**reach
+        wanted = mesh.coordinates[own] * images[kind].size
+        # Images that repeat are equal after 2048 texels.
+        assert np.abs((texels - wanted + 1024) % 2048 - 1024).max() <= 2.0 ** (reach - 17)
+    far, wide = (replace(mesh, coordinates=looks["coordinates"] * scale + moved) for scale, moved in MOVED)
+    clamped = {0: replace(images[0], wrap=("clamp", "clamp"))}
+    with pytest.raises(ValueError, match="material 0 is over 1984 texels from the border"):
+        MeshMemory.of([far], AttributeSpans(False, True), clamped)
+    with pytest.raises(ValueError, match="material 0 crosses over 4096 texels"):
+        MeshMemory.of([wide], AttributeSpans(False, True), images)
 
 
 def test_block_rams_by_hand():

@@ -5,9 +5,11 @@ import pytest
 
 from blysk.bench.units.operands import unit_codes
 from blysk.bench.units.video.vertex_unit import any_matrix
+from blysk.golden.albedo.attribute_spans import AttributeSpans
+from blysk.golden.geometry.surface_words import SurfaceWords
 from blysk.golden.number.fixed import Fixed
 from blysk.golden.number.unit_vector import COMPONENT, ONE
-from blysk.golden.video.vertex_unit import ENTRY, OFFSET, VertexTransform
+from blysk.golden.video.vertex_unit import ENTRY, OFFSET, WEIGHT, VertexTransform
 
 
 def _exact(position, normal, matrix, unit):
@@ -63,3 +65,26 @@ def test_outside_is_what_is_outside(distance):
 def test_scale_bits_out_of_range():
     with pytest.raises(ValueError, match="scale_bits must be 4 to 11, not 12"):
         VertexTransform(12)
+
+
+def test_attributes_are_quotients_within_their_bound():
+    """A word over the word of 1/W is the attribute. The bound is for attributes that are rounded once."""
+    rng, unit, count = np.random.default_rng(12), VertexTransform(surface=AttributeSpans(True, True)), 20_000
+    for distance in (1.4, 9.0, 15.0):
+        matrix = any_matrix(rng, distance)
+        position = rng.integers(-ONE, ONE + 1, (count, 3))
+        exact = np.concatenate([rng.random((count, 3)), rng.uniform(-1, 1, (count, 2))], axis=1)
+        exact[0], exact[1] = 0, 1
+        codes = np.rint(exact * SurfaceWords.LARGEST * 2**17).astype(np.int64)
+        made = unit.compute(position, unit_codes(rng, count), matrix, codes)
+        words, weight = made.surface[:, :-1], made.surface[:, -1:]
+        _, _, _, w = _exact(position, unit_codes(rng, count), matrix, unit)
+        kept = ~made.outside
+        error = np.abs(words / weight - exact)[kept]
+        bound = unit.surface_error(w[kept])[:, np.newaxis]
+        assert (error <= bound).all()
+        assert (error / bound).max() > 0.5
+        # White stays white, and no word is over the word of 1/W.
+        np.testing.assert_array_equal(words[1], np.repeat(weight[1], 5))
+        assert codes.max() == WEIGHT
+        assert (np.abs(words) <= weight + 1).all()

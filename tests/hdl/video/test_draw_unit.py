@@ -5,11 +5,13 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from blysk.golden.frames.surface import fixed_albedo_of
 from blysk.golden.presets import preset
 from blysk.golden.reference.camera import Camera
 from blysk.golden.reference.geometry import Mesh
 from blysk.golden.reference.lighting import Light, Material
 from blysk.golden.reference.scene import Scene
+from blysk.golden.reference.texture import Texture
 from blysk.golden.video.controls import BUTTONS, Controls
 from blysk.golden.video.draw_unit import Drawing, board_design
 from blysk.hdl.video.draw_unit import COUNTERS, RENDERED
@@ -141,6 +143,33 @@ def test_highlights_of_phong_follow_the_light(lights):
     buttons = [0, 1 << BUTTONS.index("light"), *[0] * (len(bands) - 2)]
     found = DrawingSimulator(drawing).run(bands, buttons)
     assert_equal(found, expected(drawing, bands, buttons))
+    assert sum(len(pixels) for pixels in found.pixels) > 500
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("style", [pytest.param("throughput", marks=pytest.mark.ci), "compact"])
+def test_vertex_colours_and_a_texture(style):
+    """Two materials have images of different sizes, fixed in the texel memory. Two frames equal the model."""
+    rng, mesh = np.random.default_rng(6), teapot(64)
+    camera = Camera.framing(mesh.vertices, (0.3, 0.5, 1), "perspective", 1.5, margin=0.12)
+    mesh = replace(
+        mesh,
+        material=np.arange(len(mesh.faces)) % 2,
+        colors=rng.random((len(mesh.vertices), 3)),
+        coordinates=mesh.vertices[:, :2],
+    )
+    images = (
+        Texture(rng.random((8, 16, 3)), ("repeat", "mirror"), mipmapped=False),
+        Texture(rng.random((4, 4, 3)), ("clamp", "clamp"), "nearest", mipmapped=False),
+    )
+    materials = tuple(Material((0.1,) * 3, (0.7,) * 3, (0.5,) * 3, 40, texture=image) for image in images)
+    shown = Scene(mesh, camera, 48, 32, materials, LAMPS[:1], back_faces="cull")
+    design = replace(board_design(materials=2), transfer="srgb", albedo=fixed_albedo_of(shown))
+    design = design.built(top="render", geometry_style=style)
+    drawing = Drawing.of([shown, shown], design, controls=Controls(materials=2, step=300))
+    bands = [*range(drawing.bands)] * 2
+    found = DrawingSimulator(drawing).run(bands)
+    assert_equal(found, expected(drawing, bands))
     assert sum(len(pixels) for pixels in found.pixels) > 500
 
 
