@@ -24,7 +24,8 @@ class Spans:
         Number of pixels, 0 to 4095. A span of length 0 gives no pixel. After the largest x, x goes on from 0.
     normal_left, normal_right : int arrays, shape (spans, 3)
         Unit normals at the first and the last pixel centre, as codes of ``SQ(1, 17)``. For a method that
-        takes other vectors: these vectors, as codes of its `Interpolator.END_FORMAT`.
+        takes other vectors: these vectors, as codes of its `Interpolator.END_FORMAT`. 0 for a method that
+        reads ``values`` or ``vectors``.
     material : int array, shape (spans,), optional
         Index of the material. Empty: 0 for all.
     values : SpanValues, optional

@@ -1,6 +1,7 @@
 """Spans of the quotient method: squared lengths and lines of every pixel, by forward differences."""
 
 from dataclasses import dataclass
+from functools import reduce
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -67,19 +68,20 @@ class SpanVectors(NamedTuple):
         steps = np.maximum(length - 1, 1)
         right = np.where((length == 1)[:, np.newaxis], left, right)
         bits = format.fraction_bits
-        largest = np.maximum(np.abs(left), np.abs(right)).max(axis=1)
+        # A maximum of columns takes a fraction of the time of a maximum along a short axis.
+        largest = reduce(np.maximum, np.maximum(np.abs(left), np.abs(right)).T)
         if not (np.isfinite(largest) & (largest > 0)).all():
             raise ValueError("a span needs a vector at one of its ends that is finite and not 0")
         scale = ((1 - MARGIN * 2.0**-bits) / largest)[:, np.newaxis]
         step = (right - left) * scale / steps[:, np.newaxis]
-        largest = np.maximum(np.abs(step).max(axis=1), 2.0**-60)
+        largest = np.maximum(reduce(np.maximum, np.abs(step).T), 2.0**-60)
         fits = np.floor(-np.log2(largest * (1 + 2.0**-bits))).astype(np.int64)
         if (fits < 0).any():
             raise ValueError("the step of a span of two pixels does not fit: give two spans of one pixel")
         exponent = np.minimum(fits, np.ceil(np.log2(steps)).astype(np.int64) + 3)
         return cls(
             Fixed.round(format, left * scale).codes,
-            Fixed.round(format, np.ldexp(step, exponent[:, np.newaxis])).codes,
+            Fixed.round(format, step * np.ldexp(1.0, exponent)[:, np.newaxis]).codes,
             exponent,
         )
 

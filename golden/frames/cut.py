@@ -12,8 +12,9 @@ from blysk.golden.frames.pieces import Pieces
 from blysk.golden.frames.surface import MOST_TEXELS
 from blysk.golden.methods.frame_steps import SpanCutter
 from blysk.golden.methods.interpolator import Interpolator
+from blysk.golden.number.spans import LENGTH_BITS
 from blysk.golden.pipeline import ShadingPipeline
-from blysk.golden.reference.geometry import normalise
+from blysk.golden.reference.geometry import any_component, normalise, sum_of_components
 from blysk.golden.reference.levels import texel_places
 from blysk.golden.reference.raster import Raster
 from blysk.golden.reference.scene import Scene
@@ -240,16 +241,18 @@ def cut_by_ends(raster: Raster, largest_ratio: float, also: _Criterion | None = 
     def differs(origin: np.ndarray, first: np.ndarray, last: np.ndarray) -> np.ndarray:
         steps = np.maximum(raster.length[origin] - 1, 1)
         left, right = (lines_along(raster, origin, place / steps) for place in (first, last))
-        shorter, longer = np.sort([np.linalg.norm(end, axis=1) for end in (left, right)], axis=0)
+        squares = [sum_of_components(end * end) for end in (left, right)]
+        shorter, longer = (np.sqrt(of(*squares)) for of in (np.minimum, np.maximum))
         wide: np.ndarray = longer > largest_ratio * shorter
-        wide |= np.einsum("ij,ij->i", left, right) < 0
+        wide |= sum_of_components(left * right) < 0
         wide &= last > first
         return wide if also is None else wide | also(origin, first, last)
 
-    spans = np.arange(len(raster.length))
-    cut = int(np.count_nonzero(differs(spans, np.zeros_like(spans), raster.length.astype(np.int64) - 1)))
-    whole, _ = _halve(raster, lambda *piece: differs(*piece) | (piece[2] - piece[1] == 1))
-    return whole, cut
+    last = raster.length.astype(np.int64) - 1
+    wide = _answers(differs, np.arange(len(last)), np.zeros_like(last), last)
+    is_wide: _Criterion = lambda *piece: differs(*piece) | (piece[2] - piece[1] == 1)  # noqa: E731
+    whole, _ = _halve(raster, is_wide, whole=wide | (last == 1))
+    return whole, int(np.count_nonzero(wide))
 
 
 def split_pairs(raster: Raster, also: _Criterion | None = None) -> Raster:
@@ -262,26 +265,41 @@ def split_pairs(raster: Raster, also: _Criterion | None = None) -> Raster:
 
 def _normals(raster: Raster, span: np.ndarray, place: np.ndarray) -> np.ndarray:
     """True unit normals at places of spans, in pixels, fractions included."""
-    line = lines_along(raster, span, place / np.maximum(raster.length[span] - 1, 1))
+    return _unit(raster, span, lines_along(raster, span, place / np.maximum(raster.length[span] - 1, 1)))
+
+
+def _unit(raster: Raster, span: np.ndarray, line: np.ndarray) -> np.ndarray:
+    """Unit normals of `lines_along`."""
     # Between opposite normals the line passes through 0, where no normal is better than another.
-    return np.where(line.any(axis=1, keepdims=True), normalise(line), raster.normal_left[span])
+    return np.where(any_component(line)[:, np.newaxis], normalise(line), raster.normal_left[span])
 
 
-def _halve(raster: Raster, is_wide: _Criterion, also: _Criterion | None = None) -> tuple[Raster, int]:
+def _answers(is_wide: _Criterion, *piece: np.ndarray) -> np.ndarray:
+    """Whether parts of spans have to be halved: ``is_wide(span, first pixel, last pixel)``, in chunks."""
+    wide = np.zeros(len(piece[0]), dtype=bool)
+    for part in chunks(len(wide)):
+        wide[part] = is_wide(*(of[part] for of in piece))
+    return wide
+
+
+def _halve(
+    raster: Raster, is_wide: _Criterion, also: _Criterion | None = None, whole: np.ndarray | None = None
+) -> tuple[Raster, int]:
     """Halve spans while ``is_wide(span, first pixel, last pixel)`` or ``also`` with these arguments is true.
 
-    Also returns the number of halved spans.
+    ``whole`` has the answers for whole spans, if they are known. Also returns the number of halved spans.
     """
     origin = np.arange(len(raster.length))
     first = np.zeros(len(origin), dtype=np.int64)
     last = raster.length.astype(np.int64) - 1
     settled = []
     while len(origin):
-        wide = np.zeros(len(origin), dtype=bool)
-        for part in chunks(len(origin)):
-            wide[part] = is_wide(origin[part], first[part], last[part])
+        if whole is None:
+            wide = _answers(is_wide, origin, first, last)
             if also is not None:
-                wide[part] |= also(origin[part], first[part], last[part])
+                wide |= _answers(also, origin, first, last)
+        else:
+            wide, whole = whole, None
         settled.append((origin[~wide], first[~wide], last[~wide]))
         origin, first, last = origin[wide], first[wide], last[wide]
         middle = (first + last + 1) // 2
@@ -295,7 +313,7 @@ def _halve(raster: Raster, is_wide: _Criterion, also: _Criterion | None = None) 
 
 def _parts(raster: Raster, origin: np.ndarray, first: np.ndarray, last: np.ndarray) -> Raster:
     """Raster of parts of spans: each part has the pixels ``first`` to ``last`` of the span ``origin``."""
-    order = np.lexsort((first, origin))
+    order = np.argsort((origin << LENGTH_BITS) | first)
     origin, first, last = (field[order] for field in (origin, first, last))
     length = (last - first + 1).astype(np.int32)
     start = np.cumsum(length) - length
@@ -303,13 +321,14 @@ def _parts(raster: Raster, origin: np.ndarray, first: np.ndarray, last: np.ndarr
     ends = {}
     for side, place in (("left", first), ("right", last)):
         for name in ("normal", "weights", "magnitude"):
-            ends[f"{name}_{side}"] = getattr(raster, f"{name}_{side}")[origin]
+            ends[f"{name}_{side}"] = getattr(raster, f"{name}_{side}").take(origin, axis=0)
         # The rasteriser's own ends stay as they are, to the bit.
         inner = np.flatnonzero(place != (0 if side == "left" else steps))
         span, t = origin[inner], place[inner] / steps[inner]
-        ends[f"normal_{side}"][inner] = _normals(raster, span, place[inner])
+        line = lines_along(raster, span, t)
+        ends[f"normal_{side}"][inner] = _unit(raster, span, line)
         ends[f"weights_{side}"][inner] = weights_along(raster, span, t)
-        ends[f"magnitude_{side}"][inner] = np.linalg.norm(lines_along(raster, span, t), axis=1)
+        ends[f"magnitude_{side}"][inner] = np.sqrt(sum_of_components(line * line))
     span = np.repeat(np.arange(len(length), dtype=np.int32), length)
     found: Raster = replace(
         raster,

@@ -30,7 +30,8 @@ CHUNK = 1 << 16
 def weights_along(raster: Raster, span: np.ndarray, t: np.ndarray) -> np.ndarray:
     """Weights of the triangle's corners at t of each span, shape (spans, 3); they are linear in t."""
     t = t[:, np.newaxis]
-    found: np.ndarray = (1 - t) * raster.weights_left[span] + t * raster.weights_right[span]
+    left, right = (of.take(span, axis=0) for of in (raster.weights_left, raster.weights_right))
+    found: np.ndarray = (1 - t) * left + t * right
     return found
 
 
@@ -42,12 +43,14 @@ def lines_along(raster: Raster, span: np.ndarray, t: np.ndarray) -> np.ndarray:
     return found
 
 
-def line_ends(raster: Raster, span: np.ndarray | slice = slice(None)) -> tuple[np.ndarray, np.ndarray]:
+def line_ends(raster: Raster, span: np.ndarray | None = None) -> tuple[np.ndarray, np.ndarray]:
     """Normals with their lengths at the two ends of all or some spans, each of shape (spans, 3)."""
-    return (
-        raster.magnitude_left[span, np.newaxis] * raster.normal_left[span],
-        raster.magnitude_right[span, np.newaxis] * raster.normal_right[span],
-    )
+    ends = (raster.magnitude_left, raster.normal_left), (raster.magnitude_right, raster.normal_right)
+    if span is not None:
+        # `take` of rows takes a third of the time of an index.
+        ends = tuple((of.take(span), normal.take(span, axis=0)) for of, normal in ends)
+    left, right = (of[:, np.newaxis] * normal for of, normal in ends)
+    return left, right
 
 
 @dataclass(frozen=True)

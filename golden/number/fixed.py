@@ -207,9 +207,8 @@ class Fixed:
         ValueError
             If a value is outside the format's range.
         """
-        return cls(
-            format, np.floor(np.ldexp(np.asarray(values, float), format.fraction_bits) + 0.5).astype(np.int64)
-        )
+        scaled = np.asarray(values, float) * 2.0**format.fraction_bits
+        return cls(format, np.floor(scaled + 0.5).astype(np.int64))
 
     def __repr__(self) -> str:
         return f"Fixed({self.format}, {self.codes!r})"

@@ -9,7 +9,7 @@ import numpy as np
 from blysk.golden.number.spans import runs_of
 from blysk.golden.reference.cutout import dropped_fragments
 from blysk.golden.reference.faces import face_normals, seen_from_behind
-from blysk.golden.reference.geometry import any_component, normalise, shares_between, sum_of_components
+from blysk.golden.reference.geometry import normalise, shares_between, sum_of_components
 from blysk.golden.reference.levels import span_levels
 from blysk.golden.reference.scene import Scene
 
@@ -26,7 +26,7 @@ SUBPIXELS = 256
 # steps give products within 2^59.
 _GUARD = float(2**20)
 # Scanlines or fragments handled at once; bounds the memory, changes no result.
-_CHUNK = 1 << 20
+_CHUNK = 1 << 16
 
 
 @dataclass(frozen=True)
@@ -117,31 +117,28 @@ class Raster:
 class _Pieces:
     """Triangles ready to be filled: the mesh's triangles after clipping, all of one winding.
 
-    ``points`` (P, 3, 2) are int64 in 1/256 pixel; ``area`` (P,) is twice the triangle's area, positive;
-    ``weight`` (P, 3) is 1 / W, ``nearness`` (P, 3) is linear on the screen and larger when nearer; ``corner``
-    (P, 3, 3) holds each corner's barycentric coordinates in the mesh's triangle ``triangle`` (P,).
+    ``a``, ``b`` and ``c`` (3, P) are int64. Row i has the edge function ``a x + b y + c`` of the edge that
+    lies opposite corner i, with x and y in whole pixels. Inside the triangle each function is positive. The
+    sum of the three is ``area`` (P,), twice the triangle's area. ``low`` and ``high`` (P,) are the first and
+    the last scanline of the picture that may have pixels. ``weight`` (3, P) is 1 / W, ``nearness`` (3, P) is
+    linear on the screen and larger when nearer.
+
+    ``turned`` (P,) tells which triangles have corners 1 and 2 exchanged. ``corner`` (P, 3, 3) holds each
+    corner's barycentric coordinates in the mesh's triangle ``triangle`` (P,). It is ``None`` if no triangle
+    was clipped.
     """
 
-    points: np.ndarray
+    a: np.ndarray
+    b: np.ndarray
+    c: np.ndarray
     area: np.ndarray
+    low: np.ndarray
+    high: np.ndarray
     weight: np.ndarray
     nearness: np.ndarray
-    corner: np.ndarray
+    turned: np.ndarray
+    corner: np.ndarray | None
     triangle: np.ndarray
-
-    def edges(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """A, B and C of each edge function ``A x + B y + C``, shape (P, 3), with x and y in whole pixels.
-
-        Edge i lies opposite corner i. Inside the triangle each function is positive. The sum of the three is
-        the area.
-        """
-        start = self.points[:, [1, 2, 0]]
-        end = self.points[:, [2, 0, 1]]
-        a = start[..., 1] - end[..., 1]
-        b = end[..., 0] - start[..., 0]
-        half = SUBPIXELS // 2
-        c = a * (half - start[..., 0]) + b * (half - start[..., 1])
-        return a * SUBPIXELS, b * SUBPIXELS, c
 
 
 def _clip(records: np.ndarray, source: np.ndarray, distance: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -177,7 +174,7 @@ def _clip(records: np.ndarray, source: np.ndarray, distance: np.ndarray) -> tupl
 
 
 def _assemble(
-    scene: Scene, candidates: np.ndarray, corners: np.ndarray
+    scene: Scene, candidates: np.ndarray, homogeneous: np.ndarray
 ) -> tuple[_Pieces, np.ndarray, np.ndarray]:
     """Clip, divide and round triangles. Drop triangles without area, and back faces if the scene culls.
 
@@ -186,45 +183,61 @@ def _assemble(
     a back.
     """
     near = scene.camera.near
-    x, y, w, depth = np.moveaxis(corners, -1, 0)
+    vertices = scene.mesh.faces[candidates].T
+    x, y, w, depth = corners = np.stack([column[vertices] for column in homogeneous.T])
     beyond = (np.maximum(np.abs(x), np.abs(y)) > _GUARD * w) | (depth < near)
-    crossing = any_component(beyond)
-    whole = ~crossing
-    corner = np.broadcast_to(np.eye(3), (len(corners), 3, 3))
+    crossing = beyond[0] | beyond[1] | beyond[2]
+    corner = None
     triangle = candidates
     if crossing.any():
-        records = np.concatenate((corners[crossing], corner[crossing]), axis=-1)
-        source = candidates[crossing]
-        records, source = _clip(records, source, records[..., 3] - near)
+        unit = np.broadcast_to(np.eye(3), (len(candidates), 3, 3))
+        rows = np.concatenate((corners.transpose(2, 1, 0), unit), axis=-1)
+        records, source = _clip(rows[crossing], candidates[crossing], rows[crossing, :, 3] - near)
         for axis in (0, 1):
             for sign in (1, -1):
                 records, source = _clip(records, source, _GUARD * records[..., 2] - sign * records[..., axis])
-        corners = np.concatenate((corners[whole], records[..., :4]))
-        corner = np.concatenate((corner[whole], records[..., 4:]))
-        triangle = np.concatenate((candidates[whole], source))
+        rows = np.concatenate((rows[~crossing], records))
+        triangle = np.concatenate((candidates[~crossing], source))
         order = np.argsort(triangle, kind="stable")
-        corners, corner, triangle = corners[order], corner[order], triangle[order]
+        rows, triangle = rows[order], triangle[order]
+        corner = rows[..., 4:]
+        x, y, w, depth = rows[..., :4].transpose(2, 1, 0)
     left_over = triangle
 
-    points = np.rint(corners[..., :2] / corners[..., 2:3] * SUBPIXELS).astype(np.int64)
-    first, second = points[:, 1] - points[:, 0], points[:, 2] - points[:, 0]
-    area = first[:, 0] * second[:, 1] - first[:, 1] * second[:, 0]
-    weight = 1 / corners[..., 2]
-    nearness = weight if scene.camera.projection == "perspective" else -corners[..., 3]
-    clockwise = area < 0
-    turn = np.where(clockwise[:, np.newaxis], [0, 2, 1], [0, 1, 2])
-    rows = np.arange(len(area))[:, np.newaxis]
+    x, y = (np.rint(place / w * SUBPIXELS).astype(np.int64) for place in (x, y))
+    area = (x[1] - x[0]) * (y[2] - y[0]) - (y[1] - y[0]) * (x[2] - x[0])
+    weight = 1 / w
+    nearness = weight if scene.camera.projection == "perspective" else -depth
     solid = area != 0
     # y grows downwards, so an area over 0 is clockwise.
-    shown = solid & ~((area > 0) & scene.culls[triangle])
+    shown = np.flatnonzero(solid & ~((area > 0) & scene.culls[triangle]))
+    turned = area[shown] < 0
+
+    def turn(values: np.ndarray) -> np.ndarray:
+        first, second, third = values[:, shown]
+        return np.stack((first, np.where(turned, third, second), np.where(turned, second, third)))
+
+    x, y = turn(x), turn(y)
+    half = SUBPIXELS // 2
+    start, end = [1, 2, 0], [2, 0, 1]
+    a, b = y[start] - y[end], x[end] - x[start]
+    # A pixel centre on a flat lower edge is outside.
+    flat = ((a == 0) & (b < 0)).any(axis=0)
     pieces = _Pieces(
-        points=points[rows, turn][shown],
+        a=a * SUBPIXELS,
+        b=b * SUBPIXELS,
+        c=a * (half - x[start]) + b * (half - y[start]),
         area=np.abs(area[shown]),
-        weight=weight[rows, turn][shown],
-        nearness=nearness[rows, turn][shown],
-        corner=corner[rows, turn][shown],
+        low=np.maximum(-((half - y.min(axis=0)) // SUBPIXELS), 0),
+        high=np.minimum((y.max(axis=0) - half - flat) // SUBPIXELS, scene.height - 1),
+        weight=turn(weight),
+        nearness=turn(nearness),
+        turned=turned,
+        corner=corner if corner is None else corner[shown],
         triangle=triangle[shown],
     )
+    if corner is not None:
+        pieces.corner[turned] = pieces.corner[turned][:, [0, 2, 1]]
     return pieces, left_over, triangle[solid]
 
 
@@ -236,39 +249,44 @@ def _counting(counts: np.ndarray) -> np.ndarray:
 
 
 def _spans(
-    pieces: _Pieces, width: int, height: int
+    pieces: _Pieces, width: int
 ) -> Iterator[tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray, np.ndarray, np.ndarray]]:
     """Spans in chunks: piece, x, y, length, nearness at the first pixel, step of nearness per pixel."""
-    a, b, c = pieces.edges()
-    # A pixel centre exactly on an edge belongs to the triangle on whose left or top that edge is.
-    top_left = (a > 0) | ((a == 0) & (b > 0))
-    # E >= 0 on top and left edges, E >= 1 on the others.
-    biased = c - ~top_left
-    scaled = pieces.nearness / pieces.area[:, np.newaxis]
-    step = sum_of_components(a * scaled)
-    half = SUBPIXELS // 2
-    low = np.maximum(-((half - pieces.points[..., 1].min(axis=1)) // SUBPIXELS), 0)
-    high = np.minimum((pieces.points[..., 1].max(axis=1) - half) // SUBPIXELS, height - 1)
-    lines = np.maximum(high - low + 1, 0)
+    a, b, c = pieces.a, pieces.b, pieces.c
+    scaled = pieces.nearness / pieces.area
+    step = sum_of_components((a * scaled).T)
+    # On one side of a triangle there is one edge, on the other side there are one or two.
+    single_left = (a > 0).sum(axis=0) == 1
+    side = np.where(single_left, a, -a)
+    order = np.stack(
+        [
+            np.where(side[0] > 0, 0, np.where(side[1] > 0, 1, 2)),
+            np.where(side[0] < 0, 0, np.where(side[1] < 0, 1, 2)),
+            np.where(side[2] < 0, 2, np.where(side[1] < 0, 1, 0)),
+        ]
+    )
+    # A pixel centre exactly on an edge belongs to the triangle on whose left or top that edge is. E >= 0 on
+    # top and left edges, E >= 1 on the others.
+    biased = c - ~((a > 0) | ((a == 0) & (b > 0)))
+    lines = np.maximum(pieces.high - pieces.low + 1, 0)
+    edges = [np.take_along_axis(of, order, axis=0) for of in (np.abs(a), b, biased)]
     for run in runs_of(lines, _CHUNK):
         count = lines[run]
         piece = np.repeat(np.arange(run.start, run.stop), count)
-        y = np.repeat(low[run], count) + _counting(count)
-        left = np.zeros(len(piece), dtype=np.int64)
-        right = np.full(len(piece), width - 1, dtype=np.int64)
-        for edge in range(3):
-            slope = a[piece, edge]
-            value = biased[piece, edge] + b[piece, edge] * y
-            bound = value // np.where(slope == 0, 1, np.abs(slope))
-            np.maximum(left, -bound, out=left, where=slope > 0)
-            np.minimum(right, bound, out=right, where=slope < 0)
-            np.copyto(right, -1, where=(slope == 0) & (value < 0))
+        y = pieces.low[piece] + _counting(count)
+        single, one, other = (
+            (biased[piece] + b[piece] * y) // slope[piece] for slope, b, biased in zip(*edges, strict=True)
+        )
+        double = np.minimum(one, other)
+        on_left = single_left[piece]
+        left = np.maximum(-np.where(on_left, single, double), 0)
+        right = np.minimum(np.where(on_left, double, single), width - 1)
         covered = np.flatnonzero(right >= left)
         piece, left, y = piece[covered], left[covered], y[covered]
         nearness = np.zeros(len(piece))
         for edge in range(3):
-            value = c[piece, edge] + b[piece, edge] * y + a[piece, edge] * left
-            nearness += value * scaled[piece, edge]
+            value = c[edge][piece] + b[edge][piece] * y + a[edge][piece] * left
+            nearness += value * scaled[edge][piece]
         yield piece, left, y, right[covered] - left + 1, nearness, step[piece]
 
 
@@ -298,11 +316,12 @@ def rasterise(scene: Scene) -> Raster:
     back = seen_from_behind(scene, plane)
 
     x, y, w, depth = homogeneous.T
-    outside = np.zeros(len(faces), dtype=bool)
-    for beyond in (x < 0, x > width * w, y < 0, y > height * w, depth < scene.camera.near):
-        outside |= beyond[faces[:, 0]] & beyond[faces[:, 1]] & beyond[faces[:, 2]]
+    beyond = np.zeros(len(homogeneous), dtype=np.uint8)
+    for bit, of in enumerate((x < 0, x > width * w, y < 0, y > height * w, depth < scene.camera.near)):
+        beyond |= of.astype(np.uint8) << bit
+    outside = (beyond[faces[:, 0]] & beyond[faces[:, 1]] & beyond[faces[:, 2]]) != 0
     candidates = np.flatnonzero(~outside)
-    pieces, left_over, solid = _assemble(scene, candidates, homogeneous[faces[candidates]])
+    pieces, left_over, solid = _assemble(scene, candidates, homogeneous)
     present = np.zeros((4, len(faces)), dtype=bool)
     for row, triangles in zip(present, (left_over, solid, pieces.triangle), strict=False):
         row[triangles] = True
@@ -310,57 +329,53 @@ def rasterise(scene: Scene) -> Raster:
     (piece, left, line, length), owner, dropped = _drawn(scene, pieces)
     count = len(piece)
     present[3, pieces.triangle[piece]] = True
-    seen = np.zeros(count, dtype=bool)
-    seen[owner[owner >= 0]] = True
-    kept = np.flatnonzero(seen)
+    seen = np.zeros(count + 1, dtype=bool)
+    # Pixels without a span, whose owner is -1, mark the place behind the last span.
+    seen[owner] = True
+    kept = np.flatnonzero(seen[:count])
     if (left_over[1:] == left_over[:-1]).any():
         # The pieces of a clipped triangle follow each other; its spans follow y.
         kept = kept[np.lexsort((left[kept], line[kept], pieces.triangle[piece[kept]]))]
-    renumbered = np.full(count + 1, -1, dtype=np.int32)
-    renumbered[kept] = np.arange(len(kept), dtype=np.int32)
-    owner = renumbered[owner]
     piece, left, line, length = piece[kept], left[kept], line[kept], length[kept]
 
     triangle = pieces.triangle[piece].astype(np.int32)
-    span_back = back[triangle]
-    turn = np.where(span_back & scene.flips[triangle], -1.0, 1.0)
-    fallback = plane[triangle] * turn[:, np.newaxis]
-    corners = mesh.normals[faces[triangle]] * turn[:, np.newaxis, np.newaxis]
-    ends = [
-        _end(corners, fallback, _weights(pieces, piece, column, line)) for column in (left, left + length - 1)
-    ]
+    ends = _Ends.empty(len(kept))
+    for start in range(0, len(kept), _CHUNK):
+        part = slice(start, start + _CHUNK)
+        weights = _weights(pieces, piece[part], left[part], line[part], length[part])
+        ends.fill(part, scene, triangle[part], back, plane, weights)
 
     level = np.zeros(0, dtype=np.int64)
     if any(texture.mipmapped for texture in scene.textures.values()):
-        level = span_levels(scene, triangle, [end.weights for end in ends], _slopes(pieces, piece))
+        level = span_levels(scene, triangle, list(ends.weights), _slopes(pieces, piece))
 
-    offset = _counting(length).astype(np.int16)
     span = np.repeat(np.arange(len(length), dtype=np.int32), length)
-    pixel = np.repeat(line * width + left, length)
-    pixel += offset
+    first = np.cumsum(length, dtype=np.int32) - length
+    offset = np.arange(len(span), dtype=np.int32) - first[span]
+    pixel = (line * np.int32(width) + left)[span] + offset
     return Raster(
         x=left,
         y=line,
         length=length,
         triangle=triangle,
-        normal_left=ends[0].normal,
-        normal_right=ends[1].normal,
-        magnitude_left=ends[0].magnitude,
-        magnitude_right=ends[1].magnitude,
-        weights_left=ends[0].weights,
-        weights_right=ends[1].weights,
-        back=span_back,
+        normal_left=ends.normal[0],
+        normal_right=ends.normal[1],
+        magnitude_left=ends.magnitude[0],
+        magnitude_right=ends.magnitude[1],
+        weights_left=ends.weights[0],
+        weights_right=ends.weights[1],
+        back=back[triangle],
         span=span,
-        offset=offset,
+        offset=offset.astype(np.int16),
         pixel=pixel,
-        visible=owner[pixel] == span,
+        visible=owner[pixel] == kept.astype(np.int32)[span],
         triangles=len(faces),
         degenerate=int((present[0] & ~present[1]).sum()),
         culled=int((present[1] & ~present[2]).sum()),
         outside=int(outside.sum() + len(candidates) - present[0].sum()),
         uncovered=int((present[2] & ~present[3]).sum()),
         hidden_spans=count - len(kept),
-        repaired_normals=sum(int(end.lost.sum()) for end in ends),
+        repaired_normals=int(ends.lost.sum()),
         level=level.astype(np.int8),
         dropped=dropped,
     )
@@ -372,33 +387,34 @@ def _drawn(scene: Scene, pieces: _Pieces) -> tuple[np.ndarray, np.ndarray, int]:
     Also returns the number of dropped fragments.
     """
     width, height = scene.width, scene.height
-    cut_out = np.isin(scene.mesh.material[pieces.triangle], list(scene.cutoffs))
+    cut_out = np.isin(scene.mesh.material[pieces.triangle], list(scene.cutoffs)) if scene.cutoffs else None
     dropped = 0
     owner = np.full(width * height, -1, dtype=np.int32)
     buffer = np.full(width * height, -np.inf)
     columns = []
     count = 0
-    for piece, left, line, length, nearness, step in _spans(pieces, width, height):
+    for piece, left, line, length, nearness, step in _spans(pieces, width):
         columns.append(np.stack([piece, left, line, length]).astype(np.int32))
         first_pixel = line * width + left
         for run in runs_of(length, _CHUNK):
             lengths = length[run]
-            offset = _counting(lengths)
-            pixel = np.repeat(first_pixel[run], lengths) + offset
-            value = np.repeat(nearness[run], lengths) + np.repeat(step[run], lengths) * offset
-            if cut_out[piece[run]].any():
+            span = np.repeat(np.arange(len(lengths)), lengths)
+            offset = np.arange(len(span)) - (np.cumsum(lengths) - lengths)[span]
+            pixel = first_pixel[run][span] + offset
+            value = nearness[run][span] + step[run][span] * offset
+            if cut_out is not None and cut_out[piece[run]].any():
                 which = _dropped(scene, pieces, cut_out, piece[run], left[run], line[run], lengths)
                 value[which] = -np.inf
                 dropped += int(which.sum())
-            before = buffer[pixel]
-            np.maximum.at(buffer, pixel, value)
             # A pixel must be nearer than the stored depth. At equal depth the triangle with the lower index
             # stays. It was drawn before.
-            winner = np.flatnonzero((value > before) & (value == buffer[pixel]))[::-1]
+            nearer = np.flatnonzero(value > buffer[pixel])
+            pixel, value = pixel[nearer], value[nearer]
+            np.maximum.at(buffer, pixel, value)
+            winner = np.flatnonzero(value == buffer[pixel])[::-1]
             # If a pixel is assigned several times, the last assignment counts. In reversed order it comes
             # from the first span of the chunk.
-            index = np.repeat(np.arange(count + run.start, count + run.stop, dtype=np.int32), lengths)
-            owner[pixel[winner]] = index[winner]
+            owner[pixel[winner]] = span[nearer[winner]] + (count + run.start)
         count += len(piece)
     return np.concatenate([np.zeros((4, 0), dtype=np.int32), *columns], axis=1), owner, dropped
 
@@ -417,7 +433,7 @@ def _dropped(
     found = np.repeat(of, length)
     piece, left, line, length = piece[of], left[of], line[of], length[of]
     triangle = pieces.triangle[piece]
-    ends = [_weights(pieces, piece, column, line) for column in (left, left + length - 1)]
+    ends = _weights(pieces, piece, left, line, length)
     level = np.zeros(len(piece), dtype=np.int64)
     if any(texture.mipmapped for texture in scene.textures.values()):
         level = span_levels(scene, triangle, ends, _slopes(pieces, piece))
@@ -428,40 +444,79 @@ def _dropped(
     return found
 
 
-class _End(NamedTuple):
-    """Ends of spans on one side: weights, unit normals, lengths before normalising, flags of lost normals."""
+class _Ends(NamedTuple):
+    """Both ends of spans: weights, unit normals, lengths before normalising, flags of lost normals."""
 
     weights: np.ndarray
     normal: np.ndarray
     magnitude: np.ndarray
     lost: np.ndarray
 
+    @classmethod
+    def empty(cls, count: int) -> "_Ends":
+        """Arrays for the ends of some spans."""
+        vectors = np.empty((2, 2, count, 3))
+        return cls(vectors[0], vectors[1], np.empty((2, count)), np.empty((2, count), dtype=bool))
 
-def _end(corners: np.ndarray, fallback: np.ndarray, weights: np.ndarray) -> _End:
-    """Weighted normals of corners (count, 3, 3), and the fallback where they cancel."""
-    normal = np.zeros((len(weights), 3))
-    for corner in range(3):
-        normal += weights[:, corner, np.newaxis] * corners[:, corner]
-    magnitude = np.sqrt(sum_of_components(normal * normal))
-    # Opposite unit normals leave a remainder of about 1e-16 where they should cancel.
-    lost = magnitude <= 1e-12 * sum_of_components(weights)
-    magnitude[lost] = 0.0
-    normal[lost] = fallback[lost]
-    return _End(weights, normalise(normal), magnitude, lost)
+    def fill(
+        self,
+        part: slice,
+        scene: Scene,
+        triangle: np.ndarray,
+        back: np.ndarray,
+        plane: np.ndarray,
+        weights: list[np.ndarray],
+    ) -> None:
+        """Fill a part by the weighted normals of the corners, and by the face's normal where they cancel."""
+        corners = [scene.mesh.normals[of] for of in scene.mesh.faces[triangle].T]
+        turn = np.where(back[triangle] & scene.flips[triangle], -1.0, 1.0)
+        for side, of_end in enumerate(weights):
+            first, second, third = of_end.T
+            normal = np.empty_like(of_end)
+            for axis in range(3):
+                of_axis = first * corners[0][:, axis] + second * corners[1][:, axis]
+                # The sum with 0 makes no -0.
+                normal[:, axis] = (of_axis + third * corners[2][:, axis]) * turn + 0.0
+            magnitude = np.sqrt(sum_of_components(normal * normal))
+            # Opposite unit normals leave a remainder of about 1e-16 where they should cancel.
+            lost = magnitude <= 1e-12 * sum_of_components(of_end)
+            which = np.flatnonzero(lost)
+            magnitude[which] = 0.0
+            normal[which] = plane[triangle[which]] * turn[which, np.newaxis]
+            self.weights[side, part] = of_end
+            self.normal[side, part] = normalise(normal)
+            self.magnitude[side, part] = magnitude
+            self.lost[side, part] = lost
 
 
-def _weights(pieces: _Pieces, piece: np.ndarray, x: np.ndarray, y: np.ndarray) -> np.ndarray:
-    """Barycentric coordinates in the mesh's triangle, divided by W, at pixel centres; shape (count, 3)."""
-    a, b, c = pieces.edges()
-    result = np.zeros((len(piece), 3))
+def _weights(
+    pieces: _Pieces, piece: np.ndarray, x: np.ndarray, y: np.ndarray, length: np.ndarray
+) -> list[np.ndarray]:
+    """Barycentric coordinates in the mesh's triangle, divided by W, at the first and the last pixel centre.
+
+    Each has the shape (spans, 3).
+    """
+    found = [np.zeros((len(piece), 3)) for _ in range(2)]
+    area, turned = pieces.area[piece], pieces.turned[piece]
     for edge in range(3):
-        value = c[piece, edge] + b[piece, edge] * y + a[piece, edge] * x
-        share = value / pieces.area[piece] * pieces.weight[piece, edge]
-        result += share[:, np.newaxis] * pieces.corner[piece, edge]
-    return result
+        slope, weight = pieces.a[edge][piece], pieces.weight[edge][piece]
+        first = pieces.c[edge][piece] + pieces.b[edge][piece] * y + slope * x
+        for weights, value in zip(found, (first, first + slope * (length - 1)), strict=True):
+            share = value / area * weight
+            if pieces.corner is not None:
+                weights += share[:, np.newaxis] * pieces.corner[piece, edge]
+            else:
+                weights[:, edge] = share
+    if pieces.corner is None:
+        for weights in found:
+            weights[turned, 1:] = weights[turned, :0:-1]
+    return found
 
 
 def _slopes(pieces: _Pieces, piece: np.ndarray) -> list[np.ndarray]:
     """Derivatives of `_weights` along x and along y, in pixels, each of shape (count, 3)."""
-    share = pieces.weight / pieces.area[:, np.newaxis]
-    return [np.einsum("pe,pek->pk", of * share, pieces.corner)[piece] for of in pieces.edges()[:2]]
+    corner = pieces.corner
+    if corner is None:
+        corner = np.eye(3)[np.where(pieces.turned[:, np.newaxis], [0, 2, 1], [0, 1, 2])]
+    share = pieces.weight / pieces.area
+    return [np.einsum("ep,pek->pk", of * share, corner)[piece] for of in (pieces.a, pieces.b)]
