@@ -8,12 +8,17 @@ from blysk.golden.frame_constants import (
     AXES_ADDRESS,
     AXIS_STRIDE,
     BANK_ADDRESS,
+    EMISSION_ADDRESS,
     FIELDS_OF_A_FRAME,
     FIELDS_OF_A_LIGHT,
     LIGHT_STRIDE,
     LOBE_ADDRESS,
     MATERIAL_ADDRESS,
+    TEXEL_ADDRESS,
+    TEXELS_ADDRESS,
+    TEXTURE_ADDRESS,
     THRESHOLD_ADDRESS,
+    TINTED_ADDRESS,
 )
 from blysk.golden.geometry.edge_setup import X_BITS
 from blysk.golden.geometry.triangles import LIMIT_BITS
@@ -194,6 +199,7 @@ def constant_registers(design: ShadingPipeline, axes: Sequence[str] = ()) -> lis
     if design.banks > 1:
         width = (design.banks - 1).bit_length()
         rows.append(("bank", BANK_ADDRESS, width, False, "", "bank of a material's table"))
+    rows += _albedo_rows(design)
     meanings = design.interpolator.light_meanings
     texts_of_a_light = _OF_A_LIGHT | {
         name: text if text == "not read" else f"{text}, component times {meanings.one}"
@@ -221,6 +227,30 @@ def constant_registers(design: ShadingPipeline, axes: Sequence[str] = ()) -> lis
         )
         for name, address, width, signed, form, text in sorted(rows, key=lambda row: row[1])
     ]
+
+
+def _albedo_rows(design: ShadingPipeline) -> list[tuple[str, int, int, bool, str, str]]:
+    """Name, address, width, sign, format and text of each constant of a design with an albedo."""
+    albedo, color = design.albedo, Intensity.COLOR_FORMAT
+    if albedo is None:
+        return []
+    text = "emission of the material, 255 times its value"
+    rows = [
+        (f"emission_{channel}", EMISSION_ADDRESS + k, color.width, False, str(color), text)
+        for k, channel in enumerate("rgb")
+    ]
+    if albedo.tints:
+        text = "1: the albedo multiplies the specular sum of the material, too"
+        rows.append(("tinted", TINTED_ADDRESS, 1, False, "", text))
+    if albedo.texture is None:
+        return rows
+    texts = {
+        "texture": (TEXTURE_ADDRESS, 13, "texture of the material: sizes, wrap and filter"),
+        "texture_base": (TEXTURE_ADDRESS + 1, 18, "texture of the material: base, in pairs of words"),
+        "texels": (TEXELS_ADDRESS, 18, "index from which the texels written next begin, in pairs of words"),
+        "texel": (TEXEL_ADDRESS, 18, "next half of a word of texels"),
+    }
+    return rows + [(name, address, bits, False, "", text) for name, (address, bits, text) in texts.items()]
 
 
 @dataclass(frozen=True)

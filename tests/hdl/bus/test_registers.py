@@ -1,10 +1,17 @@
 """Frame constants that the registers pass on: each accepted write once, and no other write."""
 
+from dataclasses import replace
+
 from amaranth.sim import Simulator
 
+from blysk.golden.albedo.albedo import Albedo
+from blysk.golden.albedo.texel_memory import TexelMemory
+from blysk.golden.albedo.texture_sampler import TextureSampler
 from blysk.golden.bus.registers import CONSTANTS, RegisterMap, constant_registers, frame_registers
+from blysk.golden.frame_constants import writes_of
 from blysk.golden.presets import preset
 from blysk.hdl.bus.registers import RegistersUnit
+from blysk.sim.frames.frame import sample_constants
 
 
 def test_loads():
@@ -46,3 +53,17 @@ def test_loads():
     simulator.run()
     assert len(expected) > 24
     assert found == expected
+
+
+def test_every_constant_of_an_albedo_has_a_register():
+    """Emission, tints, textures and texels: each write of a frame goes to a register that holds its word."""
+    design = preset(model="cosquad", materials=2)
+    design = replace(design, albedo=Albedo(tints=True, texture=TextureSampler(TexelMemory(104))))
+    map = RegisterMap("core", (), (), constant_registers(design))
+    writes = writes_of(sample_constants(design))
+    addresses = set(writes["address"].tolist())
+    assert addresses >= {8, 9, 10, 11, 12, 13, 14, 15}
+    for address, code in zip(writes["address"].tolist(), writes["data"].tolist(), strict=True):
+        register = map.by_address[CONSTANTS + 4 * address]
+        assert register.holds(register.extended(code))
+        assert register.width == 18 or code < 1 << register.width
