@@ -8,7 +8,7 @@ from blysk.golden.lighting.highlight_operand import MAX_EXPONENT
 if TYPE_CHECKING:
     from blysk.golden.geometry.coarse_depth import CoarseDepth
 
-__all__ = ["PIPES", "PORTS", "SETUPS", "STYLES", "TOPS", "Build", "BuildError", "Style"]
+__all__ = ["PIPES", "PORTS", "SETUPS", "STREAMS", "STYLES", "TOPS", "Build", "BuildError", "Style"]
 
 Style = Literal["throughput", "compact"]
 """Name of a style."""
@@ -27,6 +27,9 @@ TOPS = ("shader", "geometry", "render")
 
 PORTS = ("native", "axi", "wishbone")
 """Ports of a core: its own streams, or a bus."""
+
+STREAMS = (32, 64, 128)
+"""Bits of a beat of AXI4-Stream, for a core on a bus."""
 
 
 class BuildError(ValueError):
@@ -78,6 +81,9 @@ class Build:
         Depth test that drops hidden spans before shading. Only for a core from triangles to pixels.
     bus : {"native", "axi", "wishbone"}
         Ports: the core's own streams, or AXI4-Stream with registers on AXI4-Lite or Wishbone.
+    stream : {None, 32, 64, 128}
+        Bits of a beat of both AXI4-Streams of a core on a bus; ``None``: all bytes of a triangle, span or
+        pixel.
 
     Raises
     ------
@@ -95,6 +101,7 @@ class Build:
     geometry_style: Style | None = None
     coarse: "CoarseDepth | None" = None
     bus: str = "native"
+    stream: int | None = None
 
     def __post_init__(self) -> None:
         for name, values in _CHOICES.items():
@@ -111,6 +118,8 @@ class Build:
             raise BuildError("pipes", "triangles go to one pipeline", "leave out pipes, or use spans")
         if self.bus != "native" and self.pipes > 1:
             raise BuildError("pipes", f"a core on {self.bus} has one pipeline", "leave out pipes or bus")
+        if self.bus == "native" and self.stream is not None:
+            raise BuildError("stream", "the core's own ports are no AXI4-Stream", "also give bus")
         if self.merged and self.pipes == 1:
             raise BuildError("merged", "one pipeline has one stream", "also give pipes")
         triangles = "use top geometry or render"
@@ -149,5 +158,6 @@ _CHOICES = {
     "setups": SETUPS,
     "geometry_style": (None, *STYLES),
     "bus": PORTS,
+    "stream": (None, *STREAMS),
 }
 """Values that are accepted, for fields that have few values."""

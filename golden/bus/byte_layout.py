@@ -3,6 +3,7 @@
 from collections.abc import Mapping
 from dataclasses import dataclass
 from math import prod
+from typing import Any
 
 import numpy as np
 
@@ -80,11 +81,14 @@ class ByteLayout:
     ----------
     fields : tuple of Field
         At least one field, with different names.
+    multiple : int
+        Number of bytes of which the size of the payload is a multiple, too: the width of a stream.
 
     Source: docs/theory/bus.md#streams.
     """
 
     fields: tuple[Field, ...]
+    multiple: int = 1
 
     @property
     def dtype(self) -> np.dtype:
@@ -92,7 +96,16 @@ class ByteLayout:
         kinds = [
             (field.name, f"<{'i' if field.signed else 'u'}{field.size}", field.shape) for field in self.fields
         ]
-        return np.dtype(kinds, align=True)
+        plain = np.dtype(kinds, align=True)
+        if plain.itemsize % self.multiple == 0:
+            return plain
+        return np.dtype([*kinds, ("padding", "u1", (-plain.itemsize % self.multiple,))], align=True)
+
+    @property
+    def padding(self) -> int:
+        """Bytes at the end of a payload by which its size becomes a multiple of ``multiple``."""
+        plain = ByteLayout(self.fields).size
+        return -plain % self.multiple
 
     @property
     def size(self) -> int:
@@ -105,6 +118,35 @@ class ByteLayout:
         places = self.dtype.fields
         assert places is not None
         return tuple(places[field.name][1] for field in self.fields)
+
+    def columns(self, beats: Mapping[str, Any]) -> dict[str, np.ndarray]:
+        """Codes of each field, from beats as the core has them.
+
+        A member of a structure gets the name of the structure and its own name, as in the fields.
+
+        Parameters
+        ----------
+        beats : mapping of str to array or mapping
+            Arrays of codes, structured arrays, or mappings of them, by member.
+        """
+        found: dict[str, np.ndarray] = {}
+
+        def add(name: str, value: Any) -> None:
+            if isinstance(value, Mapping):
+                for key, part in value.items():
+                    add(f"{name}_{key}", part)
+            elif names := np.asarray(value).dtype.names:
+                places = range(value.shape[1]) if value.ndim > 1 else [None]
+                for k in places:
+                    part = value if k is None else value[:, k]
+                    for key in names:
+                        add("_".join(str(word) for word in (name, k, key) if word is not None), part[key])
+            else:
+                found[name] = np.asarray(value)
+
+        for name, value in beats.items():
+            add(name, value)
+        return {field.name: found[field.name] for field in self.fields}
 
     def pack(self, columns: Mapping[str, np.ndarray]) -> np.ndarray:
         """Bytes of payloads, uint8 of shape (N, size).

@@ -10,6 +10,7 @@ from blysk.golden.render import Renderer
 from blysk.hdl.bus.axi_lite import AxiLite, AxiLiteUnit
 from blysk.hdl.bus.framing import FramingUnit
 from blysk.hdl.bus.registers import RegistersUnit
+from blysk.hdl.bus.stream_width import gather_words, split_words
 from blysk.hdl.bus.tops import TOPS
 from blysk.hdl.bus.wishbone import Wishbone, WishboneUnit
 from blysk.hdl.core.views import copy_fields
@@ -53,7 +54,8 @@ class BusUnit(wiring.Component):
     """A core on a bus: a `FramingUnit` for its streams and a `RegistersUnit` for its registers, connected.
 
     Registers are written only while no frame is inside. So constants never change within a frame. No path
-    leads from a ready to a valid. s_axis_tready may depend on s_axis_tvalid and the index of a material.
+    leads from a ready to a valid. s_axis_tready may depend on s_axis_tvalid and the index of a material. If
+    the design's `Build` has a width of streams, a beat is a word of a triangle, span or pixel.
 
     Parameters
     ----------
@@ -77,6 +79,8 @@ class BusUnit(wiring.Component):
     ----------
     map : RegisterMap
         The registers.
+    stream : int
+        Bits of a beat of both streams; 0: a beat is a whole triangle, span or pixel.
 
     Source: docs/theory/bus.md#streams.
     """
@@ -101,9 +105,11 @@ class BusUnit(wiring.Component):
         )
         self._registers = RegistersUnit(self.map)
         layouts = self.framing.model
+        self.stream = design.build.stream or 0
+        size = self.stream // 8
         members = {
-            "s_axis": In(AxiStream(layouts.given.size)),
-            "m_axis": Out(AxiStream(layouts.made.size, 2)),
+            "s_axis": In(AxiStream(size or layouts.given.size)),
+            "m_axis": Out(AxiStream(size or layouts.made.size, 2)),
             member: In(signature()),
         }
         if "memory" in of_core:
@@ -116,19 +122,11 @@ class BusUnit(wiring.Component):
         m.submodules.framing = framing = self.framing
         m.submodules.registers = registers = self._registers
         m.submodules.front = front = self._front
-        given, made = self.s_axis, self.m_axis
-        m.d.comb += [
-            Value.cast(framing.i.payload.data).eq(given.tdata),
-            framing.i.payload.last.eq(given.tlast),
-            framing.i.valid.eq(given.tvalid),
-            given.tready.eq(framing.i.ready),
-            made.tdata.eq(Value.cast(framing.o.payload.data)),
-            made.tkeep.eq(~0),
-            made.tlast.eq(framing.o.payload.last),
-            made.tuser.eq(Cat(framing.o.payload.first, framing.o.payload.end)),
-            made.tvalid.eq(framing.o.valid),
-            framing.o.ready.eq(made.tready),
-        ]
+        if self.stream:
+            gather_words(m, self.s_axis, framing.i)
+            split_words(m, framing.o, self.m_axis)
+        else:
+            self._connect_streams(m)
         wiring.connect(m, front.i, registers.i)
         wiring.connect(m, registers.o, front.o)
         wiring.connect(m, wiring.flipped(getattr(self, self._member)), front.bus)
@@ -145,6 +143,22 @@ class BusUnit(wiring.Component):
         if "memory" in self.signature.members:
             wiring.connect(m, framing.memory, wiring.flipped(self.memory))
         return m
+
+    def _connect_streams(self, m: Module) -> None:
+        """Streams whose beats are whole payloads."""
+        framing, given, made = self.framing, self.s_axis, self.m_axis
+        m.d.comb += [
+            Value.cast(framing.i.payload.data).eq(given.tdata),
+            framing.i.payload.last.eq(given.tlast),
+            framing.i.valid.eq(given.tvalid),
+            given.tready.eq(framing.i.ready),
+            made.tdata.eq(Value.cast(framing.o.payload.data)),
+            made.tkeep.eq(~0),
+            made.tlast.eq(framing.o.payload.last),
+            made.tuser.eq(Cat(framing.o.payload.first, framing.o.payload.end)),
+            made.tvalid.eq(framing.o.valid),
+            framing.o.ready.eq(made.tready),
+        ]
 
 
 def core_of(design: ShadingPipeline) -> wiring.Component:

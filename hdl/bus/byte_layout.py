@@ -12,7 +12,10 @@ __all__ = ["bytes_of", "fields_of", "layout_of", "misfits"]
 
 
 def layout_of(
-    shape: ShapeLike, without: Sequence[str] = (), below: Mapping[str, int] | None = None
+    shape: ShapeLike,
+    without: Sequence[str] = (),
+    below: Mapping[str, int] | None = None,
+    multiple: int = 1,
 ) -> ByteLayout:
     """Layout of the bytes of a payload.
 
@@ -27,9 +30,12 @@ def layout_of(
         Members that are left out, because the bus carries them in another place.
     below : mapping of str to int, optional
         `Field.below` of fields by name.
+    multiple : int
+        `ByteLayout.multiple`.
     """
-    fields = [field for field, _ in _fields(shape, without)]
-    return ByteLayout(tuple(replace(field, below=(below or {}).get(field.name)) for field in fields))
+    fields = (field for field, _ in _fields(shape, without))
+    given = tuple(replace(field, below=(below or {}).get(field.name)) for field in fields)
+    return ByteLayout(given, multiple)
 
 
 def _fields(shape: ShapeLike, without: Sequence[str] = ()) -> Iterator[tuple[Field, int]]:

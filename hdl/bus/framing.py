@@ -73,7 +73,9 @@ class FramingUnit(wiring.Component):
         payloads = self.core.i.payload.shape(), self.core.o.payload.shape()
         self._without = ("last",) if self.packets == "span" else ()
         below = {} if top == "geometry" else {"material": design.materials}
-        given, made = layout_of(payloads[0], below=below), layout_of(payloads[1], self._without)
+        multiple = (design.build.stream or 8) // 8
+        given = layout_of(payloads[0], below=below, multiple=multiple)
+        made = layout_of(payloads[1], self._without, multiple=multiple)
         self.model = Framing(given, made, self.packets)
         counters = {"frames": unsigned(COUNTER_BITS), "misfits": unsigned(COUNTER_BITS), "busy": unsigned(1)}
         members = {

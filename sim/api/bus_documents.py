@@ -12,7 +12,7 @@ from blysk.hdl.render import RendererUnit
 from blysk.sim.api.options import DOCUMENTS
 from blysk.sim.run_files import MARK
 
-__all__ = ["FRAME", "documents_of", "frame_text", "layout_lines"]
+__all__ = ["FRAME", "beats_text", "documents_of", "frame_text", "layout_lines"]
 
 FRAME = "in the light's frame: H along z, L and V in the xz plane"
 """Frame of the vectors N/W of spans or corners, for a method that takes vectors."""
@@ -60,10 +60,30 @@ def _values(unit: BusUnit, field: Field) -> str:
 
 def layout_lines(layout: ByteLayout) -> list[str]:
     """A line for each field of TDATA: first byte, C type, name, number format."""
-    return [
-        f"{offset:>4}  {_declared(field):<28} {field.values}"
-        for field, offset in zip(layout.fields, layout.offsets, strict=True)
-    ]
+    rows = [(offset, _declared(field), field.values) for field, offset in _placed(layout)]
+    if layout.padding:
+        rows.append((layout.size - layout.padding, _padding(layout), _PADDED))
+    return [f"{offset:>4}  {declared:<28} {text}" for offset, declared, text in rows]
+
+
+def beats_text(unit: BusUnit, layout: ByteLayout) -> str:
+    """Bytes of a triangle, span or pixel, and if they take several beats, the number of beats."""
+    bits = unit.stream
+    if not bits:
+        return f"{layout.size} bytes"
+    return f"{layout.size} bytes in {8 * layout.size // bits} beats of {bits} bits, the lowest bytes first"
+
+
+_PADDED = "ignored on the input, 0 on the output"
+
+
+def _padding(layout: ByteLayout) -> str:
+    return f"uint8_t padding[{layout.padding}]"
+
+
+def _placed(layout: ByteLayout) -> Iterator[tuple[Field, int]]:
+    """Fields and their first bytes."""
+    return zip(layout.fields, layout.offsets, strict=True)
 
 
 def _declared(field: Field) -> str:
@@ -98,13 +118,15 @@ def _markdown(unit: BusUnit, name: str) -> str:
     for title, layout in _layouts(unit):
         lines += [
             "",
-            f"## {title}, {layout.size} bytes",
+            f"## {title}, {beats_text(unit, layout)}",
             "",
             "| byte | field | format |",
             "| ---: | --- | --- |",
         ]
-        for field, offset in zip(layout.fields, layout.offsets, strict=True):
+        for field, offset in _placed(layout):
             lines.append(f"| {offset} | `{_declared(field)}` | {_values(unit, field)} |")
+        if layout.padding:
+            lines.append(f"| {layout.size - layout.padding} | `{_padding(layout)}` | {_PADDED} |")
     return "\n".join(lines) + "\n"
 
 
@@ -135,9 +157,11 @@ def _header(unit: BusUnit, name: str) -> str:
             mask = ((1 << width) - 1) << first
             lines.append(f"#define {upper}_{register.name.upper()}_{bit.upper()} 0x{mask:X}u /* {text} */")
     for kind, (title, layout) in zip(("input", "output"), _layouts(unit), strict=True):
-        lines += ["", f"/* A beat of {title}. */", f"struct {name}_{kind} {{"]
+        lines += ["", f"/* {title}, {beats_text(unit, layout)}. */", f"struct {name}_{kind} {{"]
         for field in layout.fields:
             lines.append(f"    {_declared(field)}; /* {_values(unit, field)} */")
+        if layout.padding:
+            lines.append(f"    {_padding(layout)}; /* {_PADDED} */")
         lines.append("};")
     return "\n".join([*lines, "", "#endif", ""])
 

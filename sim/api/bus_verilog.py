@@ -8,7 +8,7 @@ from blysk.hdl.geometry.geometry import PORT_DESCRIPTIONS as GEOMETRY_PORT_DESCR
 from blysk.hdl.geometry.geometry import GeometryUnit
 from blysk.hdl.render import PORT_DESCRIPTIONS as RENDER_PORT_DESCRIPTIONS
 from blysk.hdl.render import RendererUnit
-from blysk.sim.api.bus_documents import frame_text, layout_lines
+from blysk.sim.api.bus_documents import beats_text, frame_text, layout_lines
 
 __all__ = ["bus_descriptions", "bus_header", "triangle_descriptions"]
 
@@ -23,6 +23,13 @@ _PATHS = {
     "axi": "AXI4-Lite, s_axil_*",
     "wishbone": "Wishbone B4, wb_*, classic or pipelined; wb_adr counts words",
 }
+
+
+_NARROW = {
+    "s_axis_tdata": "next bytes of a triangle or span, in the layout above",
+    "m_axis_tdata": "next bytes of a pixel or span, in the layout above",
+}
+"""Ports of streams with several beats for each triangle, span or pixel."""
 
 
 def triangle_descriptions(unit: RendererUnit | GeometryUnit) -> dict[str, str]:
@@ -53,7 +60,7 @@ def bus_descriptions(unit: BusUnit) -> dict[str, str]:
     """Descriptions of the ports of a core on a bus."""
     of_memory = {port: text for port, text in RENDER_PORT_DESCRIPTIONS.items() if port.startswith("memory_")}
     memory = of_memory if "memory" in unit.signature.members else {}
-    return PORT_DESCRIPTIONS | memory
+    return PORT_DESCRIPTIONS | (_NARROW if unit.stream else {}) | memory
 
 
 def bus_header(unit: BusUnit, bus: str, of_core: Sequence[str], constants: Sequence[str]) -> list[str]:
@@ -72,6 +79,7 @@ def bus_header(unit: BusUnit, bus: str, of_core: Sequence[str], constants: Seque
     """
     framing, map = unit.framing, unit.map
     packets, layouts = framing.packets, framing.model
+    given_bytes = beats_text(unit, layouts.given)
     # Registers take the place of these ports. The list of registers describes them.
     kept = [line for line in of_core if not line.startswith(("status_", "constants_", "before the first"))]
     registers = [
@@ -85,9 +93,9 @@ def bus_header(unit: BusUnit, bus: str, of_core: Sequence[str], constants: Seque
         f"Streams: AXI4-Stream. Registers: {_PATHS[bus]}; words of 32 bits, little endian.",
         "rst is synchronous and active high: drive it with the inverse of an active-low aresetn.",
         "",
-        f"s_axis_tdata, {layouts.given.size} bytes: byte, C declaration, format; extended by sign or 0:",
+        f"s_axis_tdata, {given_bytes}: byte, C declaration, format; extended by sign or 0:",
         *layout_lines(layouts.given),
-        f"m_axis_tdata, {layouts.made.size} bytes, likewise:",
+        f"m_axis_tdata, {beats_text(unit, layouts.made)}, likewise:",
         *layout_lines(layouts.made),
         "s_axis_tlast ends a frame: without it the last output beat never comes.",
         f"m_axis_tlast: {_MARKS[packets]}.",

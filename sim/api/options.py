@@ -5,7 +5,7 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any, Literal, NamedTuple, TypedDict, Union, get_args
 
 from blysk.golden.albedo.albedo import Albedo
-from blysk.golden.build import PIPES, PORTS, SETUPS, STYLES, TOPS, Style
+from blysk.golden.build import PIPES, PORTS, SETUPS, STREAMS, STYLES, TOPS, Style
 from blysk.golden.frame_constants import MAX_MATERIALS
 from blysk.golden.lighting.intensity import MAX_LIGHTS
 from blysk.golden.lighting.specular import MAX_EXPONENT
@@ -338,6 +338,11 @@ BUILD: dict[str, Option] = {
         "Ports of the core. native: its own streams. axi, wishbone: AXI4-Stream, with registers on AXI4-Lite "
         "or Wishbone; -o X.v then also writes X.md, X.h and X.svd.",
     ),
+    "stream": Option(
+        Few(*STREAMS),
+        None,
+        "With --bus: bits of a beat of both AXI4-Streams.  [default: a whole triangle, span or pixel]",
+    ),
     "setups": Option(
         Few(*SETUPS),
         1,
@@ -432,6 +437,7 @@ class BuildOptions(SharedOptions, total=False):
     merged: bool
     top: Literal["shader", "geometry", "render"]
     bus: Literal["native", "axi", "wishbone"]
+    stream: Literal[32, 64, 128]
     coarse: tuple[int, int] | str
 
 

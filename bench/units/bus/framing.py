@@ -10,34 +10,12 @@ from blysk.bench.units.geometry.geometry import RECORD as GEOMETRY
 from blysk.bench.units.pipeline import RECORD as SHADER
 from blysk.bench.units.record import PAUSED, Case, Record, Stimulus, Variant, first, length_of, together
 from blysk.bench.units.render import RECORD as RENDER
-from blysk.golden.bus.byte_layout import ByteLayout
 from blysk.golden.presets import preset
 from blysk.hdl.bus.framing import FramingUnit
 
 __all__ = ["RECORD"]
 
 _RECORDS = {"span": SHADER, "frame": GEOMETRY, "run": RENDER}
-
-
-def _columns(layout: ByteLayout, beats) -> dict:
-    """Beats of a core as columns with a layout's names. Names of nested members are joined."""
-    found = {}
-
-    def add(name, value):
-        if getattr(value, "dtype", None) is not None and value.dtype.names:
-            for key in value.dtype.names:
-                part = value[key]
-                for k in range(value.shape[1]) if value.ndim > 1 else [None]:
-                    add(
-                        f"{name}_{key}" if k is None else f"{name}_{k}_{key}",
-                        part if k is None else part[:, k],
-                    )
-        else:
-            found[name] = value
-
-    for name, value in beats.items():
-        add(name, value)
-    return {field.name: found[field.name] for field in layout.fields}
 
 
 def _core_cases(unit, case) -> list[Case]:
@@ -81,7 +59,7 @@ def _case(unit, rng, count, length):
     if unit.packets == "run":
         constants = {name: code for name, code in inner.constants.items() if name != "picture"}
         inner = replace(inner, constants=constants | {"keep": 0})
-    data = unit.model.given.pack(_columns(unit.model.given, inner.beats))
+    data = unit.model.given.pack(unit.model.given.columns(inner.beats))
     ends = np.cumsum(rng.integers(1, 2 * length, len(data) + 1)) - 1
     last = np.isin(np.arange(len(data)), ends)
     # The last beat of the run, and of the run with pauses, ends a frame.
