@@ -6,8 +6,8 @@ import math
 import os
 import secrets
 import tempfile
-from collections.abc import Iterator
-from contextlib import contextmanager
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager, suppress
 from contextvars import ContextVar
 from pathlib import Path
 from typing import Any
@@ -18,9 +18,11 @@ from blysk.sim.run_files import writes
 __all__ = [
     "all_or_none",
     "atomic_writer",
+    "check_new_folder",
     "check_writable",
     "files_within",
     "plain",
+    "write_folder",
     "write_json",
     "write_text",
 ]
@@ -121,6 +123,63 @@ def files_within(folder: str | os.PathLike, first: str) -> list[str]:
         for path in sorted(folder.rglob("*"))
         if not path.is_dir() and not path.name.startswith(".")
     ]
+
+
+def check_new_folder(folder: str | os.PathLike, first: str) -> None:
+    """Check, before long work, that `write_folder` can write a folder. The check writes nothing.
+
+    Parameters
+    ----------
+    folder : path
+        A new or an empty folder.
+    first : str
+        Name of a file that will be written.
+
+    Raises
+    ------
+    InputError
+        If the folder is a file, holds files, or may not be made or written.
+    """
+    if names := files_within(folder, first):
+        raise InputError(str(folder), f"holds {names[0]} already", "give a new or empty folder")
+
+
+def write_folder(folder: str | os.PathLike, files: Mapping[str, str]) -> None:
+    """Write texts into a folder: all of them, or none. Folders that an error leaves empty are removed.
+
+    Parameters
+    ----------
+    folder : path
+        A new or an empty folder, see `check_new_folder`.
+    files : mapping of str to str
+        Texts by path in the folder.
+
+    Raises
+    ------
+    InputError
+        If a file cannot be written.
+    """
+    made: list[Path] = []
+    fresh = [path for name in files if not (path := Path(folder) / name).exists()]
+    try:
+        with all_or_none():
+            for name, text in files.items():
+                path = Path(folder) / name
+                for parent in reversed([path.parent, *path.parent.parents]):
+                    if not parent.exists():
+                        parent.mkdir()
+                        made.append(parent)
+                write_text(path, text)
+    except BaseException as error:
+        for path in fresh:
+            with suppress(OSError):
+                path.unlink()
+        for parent in reversed(made):
+            with suppress(OSError):
+                parent.rmdir()
+        if isinstance(error, OSError):
+            raise _unwritable(Path(folder), error) from error
+        raise
 
 
 @contextmanager

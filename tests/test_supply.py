@@ -80,7 +80,7 @@ def test_wheel_holds_the_packages_and_no_more(wheel):
     assert any(name.endswith("licenses/LICENSE") for name in names)
     unwanted = [name for name in names if re.search(r"/(test|conftest)|\.(png|gif|vcd|obj|glb|pyc)$", name)]
     # The writer of the bench to take away, and the bench.
-    assert unwanted == ["blysk/sim/frames/testbench.py", "blysk/sim/frames/templates/test_pipeline.py"]
+    assert unwanted == ["blysk/sim/frames/testbench.py", "blysk/sim/frames/templates/test_core.py"]
     # Only sources; data would be larger.
     assert largest < 32_000
 

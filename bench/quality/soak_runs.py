@@ -27,7 +27,7 @@ from blysk.sim.engines.beats import unpack
 from blysk.sim.engines.engine import SimulationError
 from blysk.sim.engines.simulate import simulate, stimulus_of
 from blysk.sim.frames.frame import beats_of
-from blysk.sim.frames.testbench import pixel_beats
+from blysk.sim.frames.vectors import pixel_beats
 
 __all__ = [
     "DESIGNS",

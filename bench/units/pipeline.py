@@ -60,7 +60,7 @@ from blysk.golden.reference.geometry import normalise
 from blysk.golden.reference.reflection import REFLECTION_MODELS
 from blysk.hdl.pipeline import ShadingPipelineUnit
 from blysk.sim.frames.frame import beats_of
-from blysk.sim.frames.testbench import pixel_beats
+from blysk.sim.frames.vectors import pixel_beats
 
 __all__ = ["DESIGNS", "LONG_DESIGNS", "RECORD", "case_of", "spans_of"]
 

@@ -15,7 +15,7 @@ from blysk.golden.pixel_pipelines import PixelPipelines
 from blysk.golden.presets import preset
 from blysk.hdl.pixel_pipelines import MergedPipelinesUnit
 from blysk.sim.frames.frame import beats_of
-from blysk.sim.frames.testbench import pixel_beats
+from blysk.sim.frames.vectors import pixel_beats
 
 __all__ = ["RECORD"]
 

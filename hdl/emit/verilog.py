@@ -15,7 +15,7 @@ from amaranth.lib.wiring import In, Out
 
 from blysk.hdl.emit.yosys import run_yosys
 
-__all__ = ["check_name", "emit"]
+__all__ = ["check_name", "emit", "port_widths"]
 
 # Warnings of `verilator -Wall` about any generated netlist, and why the netlist is right. Old releases
 # know these names too: UNUSED covers UNUSEDSIGNAL, and WIDTH covers WIDTHEXPAND and WIDTHTRUNC.
@@ -192,6 +192,21 @@ def _ports(component: wiring.Component) -> dict[_Port, Value]:
             names.add(name)
             ports[_Port(name, member.flow, shape)] = value[offset : offset + Shape.cast(shape).width]
     return ports
+
+
+def port_widths(component: wiring.Component) -> dict[str, int]:
+    """Ports of a component's Verilog in their order: bits of an input, or minus the bits of an output.
+
+    Parameters
+    ----------
+    component : wiring.Component
+        As for `emit`, with registers.
+    """
+    found = {"clk": 1, "rst": 1}
+    for port in _ports(component):
+        width = Shape.cast(port.shape).width
+        found[port.name] = -width if port.flow is Out else width
+    return found
 
 
 class _Flat(wiring.Component):

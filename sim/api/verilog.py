@@ -28,7 +28,7 @@ from blysk.sim.api.signature import with_options
 from blysk.sim.api.verilog_example import example_of
 from blysk.sim.errors import OptionError
 
-__all__ = ["ShadingUnit", "header_of", "verilog", "verilog_and_unit"]
+__all__ = ["ShadingUnit", "header_of", "lines_of", "verilog", "verilog_and_unit"]
 
 _LIMIT = "2048 sin(a / 2), rounded down; spans with an angle over a are cut"
 _FORMATS = "SQ(i, f): two's complement, i + f bits, value = code / 2^f; UQ(i, f): the same without a sign"
@@ -187,6 +187,14 @@ def _geometry_header(unit: GeometryUnit) -> list[str]:
     return [f"blysk {version('blysk')} triangles to spans, MIT licence", _FORMATS, *_geometry_lines(unit)]
 
 
+def lines_of(unit: ShadingUnit | RendererUnit | GeometryUnit | BusUnit) -> list[str]:
+    """Description of any core in lines, see `header_of`; on a bus that of the core inside."""
+    core = unit.framing.core if isinstance(unit, BusUnit) else unit
+    if isinstance(core, GeometryUnit):
+        return _geometry_header(core)
+    return _render_header(core) if isinstance(core, RendererUnit) else header_of(core)
+
+
 def _descriptions(unit: ShadingUnit | RendererUnit) -> Mapping[str, str]:
     """Descriptions of the ports of a core with pixels as output."""
     if isinstance(unit, RendererUnit):
@@ -251,10 +259,7 @@ def verilog_and_unit(
     constants = address_table(
         *counts, p.threshold_format, loads, p.interpolator.light_meanings, axes, p.albedo
     )
-    if isinstance(core, GeometryUnit):
-        lines = _geometry_header(core)
-    else:
-        lines = _render_header(core) if isinstance(core, RendererUnit) else header_of(core)
+    lines = lines_of(core)
     words = [*constants, *example_of(p, renderer)]
     descriptions: Mapping[str, str]
     if isinstance(unit, BusUnit):

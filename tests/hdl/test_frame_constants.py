@@ -27,7 +27,7 @@ from blysk.hdl.frame_constants import FrameConstantsUnit
 from blysk.hdl.pipeline import ShadingPipelineUnit
 from blysk.sim.engines.simulate import simulate
 from blysk.sim.frames.frame import beats_of
-from blysk.sim.frames.testbench import pixel_beats
+from blysk.sim.frames.vectors import pixel_beats
 
 from ..checks import assert_beats_equal
 

@@ -24,7 +24,7 @@ from blysk.hdl.emit.cost import cost_of
 from blysk.hdl.methods.registry import unit_of
 from blysk.hdl.pipeline import ShadingPipelineUnit
 from blysk.sim.engines.simulate import simulate
-from blysk.sim.frames.testbench import pixel_beats
+from blysk.sim.frames.vectors import pixel_beats
 
 from ..checks import assert_beats_equal
 from ..lists import KINDS

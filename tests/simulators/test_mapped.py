@@ -18,7 +18,7 @@ from blysk.golden.frame_constants import writes_of
 from blysk.golden.presets import preset
 from blysk.hdl.pipeline import ShadingPipelineUnit
 from blysk.sim.frames.frame import beats_of
-from blysk.sim.frames.testbench import pixel_beats, teapot_frame
+from blysk.sim.frames.vectors import pixel_beats, teapot_frame
 
 from .mapped import connect, core, first, map_component, same, swap, verilog_of
 from .verilog_bench import BenchError, VerilogBench, assert_beats, missing_tool, pauses

@@ -11,7 +11,7 @@ from blysk.bench.units.registry import RECORDS
 from blysk.golden.frame_constants import writes_of
 from blysk.hdl.emit.verilog import emit
 from blysk.sim.frames.frame import beats_of
-from blysk.sim.frames.testbench import pixel_beats, teapot_frame
+from blysk.sim.frames.vectors import pixel_beats, teapot_frame
 
 from ..decided import digest_of
 from .verilog_bench import SIMULATORS, VerilogBench, assert_beats, missing_tool, pauses

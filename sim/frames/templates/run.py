@@ -39,7 +39,7 @@ def main() -> int:
         sources=[source], hdl_toplevel=source.stem, build_args=arguments, timescale=("1ns", "1ps"), **build
     )
     results = runner.test(
-        test_module="test_pipeline",
+        test_module="test_core",
         hdl_toplevel=source.stem,
         test_dir=FOLDER,
         seed=options.seed,

@@ -32,7 +32,12 @@ def test_verilog():
         (["--albedo", "pink"], "--albedo pink", "unknown part; give one or more of colors, nearest, "),
         (["--albedo", "colors,colors"], "--albedo colors,colors", "a name comes twice"),
         (["--albedo", "tinted"], "--albedo tinted", "also give colors, nearest or bilinear"),
-        (["--albedo", "colors", "--testbench", "bench"], "--testbench", "leave out --albedo"),
+        (["--albedo", "nearest,outside", "--testbench", "bench"], "--testbench", "leave out outside"),
+        (
+            ["--albedo", "nearest,outside", "--package", "fusesoc", "a"],
+            "--package fusesoc",
+            "leave out outside",
+        ),
         (["--albedo", "nearest,outside", "--pipes", "2"], "--pipes 2", "a single native core"),
         (["--albedo", "nearest,outside", "--bus", "axi"], "--bus axi", "a single native core"),
         (

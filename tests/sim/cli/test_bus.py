@@ -52,7 +52,8 @@ def test_ports_of_geometry_alone(method):
         (["--top", "shader", "--geometry", "hardware"], "--top shader", "it takes spans"),
         (["--bus", "axi", "--pipes", "2"], "--pipes 2", "a core on axi has one pipeline"),
         (["--bus", "axi", "-o", "core.txt"], "-o core.txt", "use a name that ends in .v"),
-        (["--bus", "axi", "--testbench", "bench"], "--testbench", "not --bus axi"),
+        (["--bus", "axi", "--stream", "48"], "--stream 48", "give one of 32, 64, 128"),
+        (["--stream", "32"], "--stream 32", "the core's own ports are no AXI4-Stream; also give bus"),
         (["--top", "render", "--method", "chord-local"], "--top render", "chord-local takes values"),
     ],
 )

@@ -89,10 +89,19 @@ def test_verilog_replaces_no_file_beside_it(capsys):
     assert all(MARK in path.read_text() for path in written)
 
 
-def test_verilog_inside_the_folder_of_its_bench(capsys):
+@pytest.mark.parametrize(
+    ("options", "says"),
+    [
+        ("--testbench bench -o bench/blysk.v", "bench/blysk.v: lies in the folder of --testbench"),
+        ("--package fusesoc bench -o bench/blysk.v", "bench/blysk.v: lies in the folder of --package"),
+        ("--testbench bench --package fusesoc bench/a", "--package: its folder lies in the folder of --test"),
+        ("--testbench bench --package fusesoc bench", "its folder lies in the folder of"),
+    ],
+)
+def test_outputs_inside_each_other(capsys, options, says):
     Path("bench").mkdir()
-    assert main(["verilog", "--testbench", "bench", "-o", "bench/blysk.v"]) == 2
-    assert "bench/blysk.v: lies in the folder of --testbench" in capsys.readouterr().err
+    assert main(["verilog", *options.split()]) == 2
+    assert says in capsys.readouterr().err
     assert files() == {}
 
 

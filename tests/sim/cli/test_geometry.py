@@ -175,8 +175,6 @@ UNKNOWN = "use one of software, hardware"
         ((*RENDER, "--coarse"), "--coarse", "also give geometry hardware"),
         ((*RENDER, "--setups", "2"), "--setups 2", NO_SETUP + "also give geometry hardware"),
         ((*VERILOG, *HARDWARE, *LOCAL), "", "takes values"),
-        # The core would send spans.
-        ((*VERILOG, *HARDWARE, "--testbench", "a"), "--testbench", "takes triangles"),
         ((*VERILOG, "--coarse", "64x48"), "--coarse", "also give top render"),
         ((*VERILOG, "--setups", "2"), "--setups 2", NO_SETUP + "use top geometry or render"),
         ((*VERILOG, "--setups", "3"), "--setups 3", "give one of 1, 2"),

@@ -64,7 +64,7 @@ def test_help_and_refused_options_are_quick():
         "render teapot -o picture.txt",
         "render teapot --light 0,0,0",
         "verilog --pipes 3",
-        "verilog --testbench a --pipes 2",
+        "verilog --package ipxact a",
     ]
     done = subprocess.run([sys.executable, "-c", QUICK, *refused], capture_output=True, text=True, check=True)
     assert done.stdout == f"(0, 0, 2) [] [0, 0] {{2}} []\n{1 + len(refused)}\n", done.stdout

@@ -17,14 +17,15 @@ import pytest
 from blysk.golden.albedo.albedo import Albedo
 from blysk.golden.albedo.texel_memory import TexelMemory
 from blysk.golden.albedo.texture_sampler import TextureSampler
+from blysk.golden.build import PORTS, TOPS
 from blysk.golden.presets import preset
-from blysk.hdl.emit.verilog import emit
-from blysk.hdl.pipeline import ShadingPipelineUnit
+from blysk.hdl.bus.bus import core_of
+from blysk.hdl.emit.verilog import port_widths
 from blysk.sim.cli.main import main
-from blysk.sim.frames.testbench import teapot_frame, vectors
+from blysk.sim.frames.vectors import teapot_frame, vectors
 
-FILES = ["README.md", "blysk.v", "run.py", "test_pipeline.py", "vectors"]
-TABLES = ["pixels.csv", "spans.csv", "status.csv", "writes.csv"]
+FILES = ["README.md", "blysk.v", "run.py", "test_core.py", "vectors"]
+TABLES = ["pixels.csv", "plan.json", "spans.csv", "status.csv", "writes.csv"]
 LAYERS = ("golden", "hdl", "sim", "bench")
 
 
@@ -96,15 +97,32 @@ def rows(path):
 )
 def test_columns_are_the_ports(design):
     """Every port except those of the control occurs once, with codes that fit the port."""
-    unit = ShadingPipelineUnit(design)
-    ports = declared(emit(unit, "core"))
-    tables = vectors(unit)
-    columns = {port: codes for table in tables.values() for port, codes in table.items()}
-    control = {port for port in ports if port in ("clk", "rst") or port.endswith(("_valid", "_ready"))}
-    assert columns.keys() == ports.keys() - control
-    assert len(columns) == sum(map(len, tables.values()))
-    for port, codes in columns.items():
-        assert -(1 << ports[port] - 1) <= codes.min() <= codes.max() < 1 << ports[port]
+    check_columns(design)
+
+
+def check_columns(design):
+    unit = core_of(design)
+    ports = port_widths(unit)
+    tables = vectors(design, unit).values()
+    columns = [(port, codes) for table in tables for port, codes in table.columns.items()]
+    control = {"clk", "rst"} | {port for port in ports if port.startswith("memory_") or port == "wb_stall"}
+    control |= {port for table in tables for port in (table.valid, table.ready)}
+    control |= {port for port in ports if port in ("wb_cyc", "wb_stb", "wb_ack", "wb_err")}
+    assert {port for port, _ in columns} == ports.keys() - control
+    # The phases before and after a frame have the same ports of Wishbone.
+    assert len({port for port, _ in columns if not port.startswith("wb_")}) == sum(
+        not port.startswith("wb_") for port, _ in columns
+    )
+    for port, codes in columns:
+        bits = abs(ports[port])
+        assert -(1 << bits - 1) <= min(codes) <= max(codes) < 1 << bits
+
+
+@pytest.mark.parametrize("bus", PORTS)
+@pytest.mark.parametrize("top", TOPS)
+def test_columns_are_the_ports_of_every_core(top, bus):
+    """The tables of each core and bus have its ports, and the words of a narrow stream fit it."""
+    check_columns(preset("linear", "cosquad").built(top=top, bus=bus, stream=None if bus == "native" else 64))
 
 
 def test_frame_shows_every_light_and_material():
@@ -139,6 +157,56 @@ def test_what_is_in_the_folder(made):
     status = rows(made / "vectors" / "status.csv")
     expected = {"out_of_range_spans": 0, "empty_spans": 1, "overrun": 0}
     assert status == [{f"status_{name}": count for name, count in expected.items()}]
+
+
+EVERY = [(top, bus) for top in TOPS for bus in PORTS if (top, bus) != ("shader", "native")]
+"""Cores and buses, without the core of the other tests."""
+
+SMALL = ("--method", "linear", "--model", "cosquad", "--style", "compact")
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("simulator", ["icarus", "verilator"])
+@pytest.mark.parametrize(("top", "bus"), EVERY)
+def test_passes_for_every_core(run, tmp_path, top, bus, simulator):
+    """The bench of each core and bus passes, and sees one bit of its expected output."""
+    folder = tmp_path / "bench"
+    assert main(["verilog", *SMALL, "--top", top, "--bus", bus, "--testbench", str(folder)]) == 0
+    done = run(folder, simulator)
+    assert done.returncode == 0, done.stdout
+    assert "PASS=4 FAIL=0" in done.stdout
+    made = "spans" if top == "geometry" else "pixels"
+    count = len(rows(folder / "vectors" / f"{made}.csv"))
+    assert count > 100
+    assert done.stdout.count(f"{count} {made} as expected, in ") == 4
+    if simulator == "icarus":
+        path = folder / "vectors" / f"{made}.csv"
+        names, first, *rest = path.read_text().splitlines()
+        codes = [int(code) for code in first.split(",")]
+        path.write_text("\n".join([names, ",".join(map(str, [codes[0] ^ 1, *codes[1:]])), *rest]) + "\n")
+        done = run(folder)
+        assert done.returncode == 1
+        assert f"{made} 0: {names.split(',')[0]} is {codes[0]}, expected {codes[0] ^ 1}" in done.stdout
+
+
+@pytest.mark.long
+@pytest.mark.parametrize(
+    "options",
+    [
+        ("--pipes", "2"),
+        ("--bus", "axi", "--stream", "32"),
+        ("--bus", "axi", "--albedo", "colors"),
+        ("--bus", "wishbone", "--materials", "3", "--albedo", "bilinear", "--method", "quotient"),
+        ("--top", "render", "--coarse", "32x24", "--bus", "axi", "--stream", "128"),
+    ],
+    ids=" ".join,
+)
+def test_passes_with_other_options(run, tmp_path, options):
+    folder = tmp_path / "bench"
+    assert main(["verilog", *SMALL, *options, "--testbench", str(folder)]) == 0
+    done = run(folder)
+    assert done.returncode == 0, done.stdout
+    assert "PASS=4 FAIL=0" in done.stdout
 
 
 @pytest.mark.long
@@ -233,16 +301,16 @@ def test_finds_one_bit_of_an_expected_pixel(run, folder):
     path.write_text("\n".join(lines) + "\n")
     done = run(folder)
     assert done.returncode == 1
-    assert f"pixel 100: o_g is {codes[column] ^ 1}, expected {codes[column]}" in done.stdout
+    assert f"pixels 100: o_g is {codes[column] ^ 1}, expected {codes[column]}" in done.stdout
     assert "PASS=0 FAIL=4" in done.stdout
 
 
 # The output, its replacement, and the message of the bench. ``given`` is the output of the pipeline.
 PLANTS = {
-    "changed": ("o_b", "given ^ waits", "pixel [0-9]+: changed while"),
-    "withdrawn": ("o_valid", "given && cycles[3:0] != 0", "pixel [0-9]+: o_valid went low while"),
+    "changed": ("o_b", "given ^ waits", "pixels [0-9]+: changed while"),
+    "withdrawn": ("o_valid", "given && cycles[3:0] != 0", "pixels [0-9]+: o_valid went low while"),
     "undefined": ("o_r", "{given[7:1], 1'bx}", "o_r is undefined: "),
-    "extra": ("o_valid", "given || taken == COUNT", "pixel COUNT: one more than the COUNT expected"),
+    "extra": ("o_valid", "given || taken == COUNT", "pixels COUNT: one more than the COUNT expected"),
     "lost": ("o_valid", "given && taken != 40", "stuck: nothing moved for 10000 cycles"),
     "miscounted": ("status_empty_spans", "given + 1", "status_empty_spans is 2, expected 1"),
 }
