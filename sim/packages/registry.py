@@ -17,6 +17,13 @@ PACKAGES: dict[str, Package] = {
             _BUSES,
             modules=("systemrdl", "peakrdl_ipxact"),
         ),
+        Package(
+            "litex",
+            "a module of LiteX with DMA and an interrupt",
+            ("wishbone",),
+            tops=("shader", "render"),
+            whole_beats=True,
+        ),
         Package("vivado", "a Tcl script and a wrapper, untried in Vivado", ("axi",)),
     )
 }

@@ -49,6 +49,10 @@ def test_the_help_and_the_guide_have_it(kind, capsys):
     [
         (["debian", "a"], "--package debian: unknown package; use one of " + ", ".join(PACKAGES)),
         (["vivado", "a"], "--package vivado: it has no form for --bus native; give --bus axi"),
+        (
+            ["litex", "a", "--bus", "wishbone", "--stream", "32"],
+            "--package litex: it changes the widths of .*",
+        ),
         (["fusesoc", "full"], "full: holds mine already; give a new or empty folder"),
         (["fusesoc", "full/mine"], "full/mine: it is a file; give the name of a folder"),
         (
