@@ -12,6 +12,9 @@ from blysk.bench.tools.families import DEVICE
 from blysk.golden.presets import LOBES, METHODS, MODELS, PUBLISHED
 from blysk.sim.api.placed import STORE, design_of, read_store
 
+COLORED = ", srgb", ", srgb, compact"
+"""Ends of the names of pipelines with an albedo."""
+
 GUIDE = Path(__file__).parents[3] / "docs/guide/fpga.md"
 
 
@@ -28,7 +31,24 @@ def test_table_of_the_guide_is_the_store():
         shown = [int(part.replace(",", "")) for part in parts]
         assert shown == [entry[name] for name in ("luts", "flip_flops", "multipliers", "block_rams")], entry
         assert [int(rate) for rate in rates.split(", ")] == sorted(map(round, entry["fmax_mhz"])), entry
-    assert len(rows) == sum(name.startswith("pipeline ") for name in store)
+    plain = [name for name in store if name.startswith("pipeline ") and not name.endswith(COLORED)]
+    assert len(rows) == len(plain)
+
+
+def test_table_of_colours_is_the_store():
+    """Every placed row of a pipeline with an albedo has the figures of the store."""
+    store = {entry["design"]: entry for entry in read_store() if entry["design"].endswith(COLORED)}
+    rows = re.findall(
+        r"^\| `(\w+)`(, compact)? \| [\w-]+ \| ([\d,]+) \| ([\d,]+) \| (\d+) \| (\d+) \| ([\d, ]+\d) \|",
+        GUIDE.read_text(encoding="utf-8"),
+        re.MULTILINE,
+    )
+    for albedo, style, *parts, rates in rows:
+        entry = store[f"pipeline quotient, blinn, 1 light, {albedo}, srgb{style}"]
+        shown = [int(part.replace(",", "")) for part in parts]
+        assert shown == [entry[name] for name in ("luts", "flip_flops", "multipliers", "block_rams")], entry
+        assert [int(rate) for rate in rates.split(", ")] == sorted(map(round, entry["fmax_mhz"])), entry
+    assert len(rows) == len(store)
 
 
 def measured(name, *rates):
