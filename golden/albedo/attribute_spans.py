@@ -9,12 +9,12 @@ from blysk.golden.number.fixed import SQ, UQ, Fixed
 from blysk.golden.number.spans import checked_lengths, pixels_of
 from blysk.golden.reference.texture import LARGEST_TEXTURE
 
-__all__ = ["LARGEST_RATIO", "MARGIN", "AttributeSpans", "AttributeWords", "SpanAttributes", "whole_texels"]
+__all__ = ["MARGIN", "WORD_DEPTH_RATIO", "AttributeSpans", "AttributeWords", "SpanAttributes", "whole_texels"]
 
 MARGIN = 4
 """Least distance of a line's ends from 1, in units of 2^-23. Rounding may add up to 3 units to a word."""
 
-LARGEST_RATIO = 2.0**15
+WORD_DEPTH_RATIO = 2.0**15
 """Largest ratio of the depths at the ends of a span."""
 
 
@@ -138,7 +138,7 @@ class SpanAttributes(NamedTuple):
         ------
         ValueError
             If a colour, a weight, a length or a level is out of range, or texture coordinates do not fit. If
-            the ratio of a span's weights is over `LARGEST_RATIO`.
+            the ratio of a span's weights is over `WORD_DEPTH_RATIO`.
         """
         length = checked_lengths(length)
         steps = np.maximum(length - 1, 1)
@@ -170,8 +170,8 @@ class SpanAttributes(NamedTuple):
             weight = np.stack([weights[0], np.where(length == 1, weights[0], weights[1])])
             if not (np.isfinite(weight) & (weight > 0)).all():
                 raise ValueError("1/W must be finite and over 0")
-            if (weight.max(axis=0) > LARGEST_RATIO * weight.min(axis=0)).any():
-                raise ValueError(f"depths of a span must be within a ratio of {LARGEST_RATIO:.0f}: cut it")
+            if (weight.max(axis=0) > WORD_DEPTH_RATIO * weight.min(axis=0)).any():
+                raise ValueError(f"depths of a span must be within a ratio of {WORD_DEPTH_RATIO:.0f}: cut it")
             weight = (weight * (limit / weight.max(axis=0)))[:, :, np.newaxis]
             lines = np.concatenate([ends * weight, weight], axis=2)
         start, step, exponent = cls._coded(model, lines, steps)
@@ -257,7 +257,7 @@ class AttributeSpans:
     3 u of the line. So words stay within ``1 - u``. A step of 1 or more comes only in a span of two pixels,
     where e is 0. Its code wraps, and its second word is the sum of two numbers modulo 2, which is right.
 
-    *w is over 0.* The smaller end of w is at least ``(1 - 4 u)/LARGEST_RATIO``, 255 u.
+    *w is over 0.* The smaller end of w is at least ``(1 - 4 u)/WORD_DEPTH_RATIO``, 255 u.
 
     Parameters
     ----------

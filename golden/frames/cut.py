@@ -20,7 +20,7 @@ from blysk.golden.reference.raster import Raster
 from blysk.golden.reference.scene import Scene
 
 __all__ = [
-    "LARGEST_RATIO",
+    "EXACT_DEPTH_RATIO",
     "cut_by_angle",
     "cut_by_attributes",
     "cut_by_ends",
@@ -34,7 +34,7 @@ __all__ = [
 _Criterion = Callable[[np.ndarray, np.ndarray, np.ndarray], np.ndarray]
 """Function of span, first pixel and last pixel: whether this part of the span has to be halved."""
 
-LARGEST_RATIO = 128.0
+EXACT_DEPTH_RATIO = 128.0
 """Ratio of depths up to which a colour is exact to a part of an LSB."""
 
 
@@ -140,7 +140,7 @@ def cut_by_angle(raster: Raster, largest_angle: float, also: _Criterion | None =
 def cut_by_attributes(scene: Scene, raster: Raster) -> tuple[Raster, int]:
     """Halve spans until the words of their attributes are exact enough, see `SpanAttributes`.
 
-    A span of several pixels crosses at most `MOST_TEXELS`, and its depths are within `LARGEST_RATIO`.
+    A span of several pixels crosses at most `MOST_TEXELS`, and its depths are within `EXACT_DEPTH_RATIO`.
 
     Parameters
     ----------
@@ -167,7 +167,7 @@ def _by_attributes(scene: Scene, raster: Raster) -> _Criterion:
         steps = np.maximum(raster.length[origin] - 1, 1)
         ends = [weights_along(raster, origin, place / steps) for place in (first, last)]
         depths = [end.sum(axis=1, keepdims=True) for end in ends]
-        wide: np.ndarray = (np.maximum(*depths) > LARGEST_RATIO * np.minimum(*depths))[:, 0]
+        wide: np.ndarray = (np.maximum(*depths) > EXACT_DEPTH_RATIO * np.minimum(*depths))[:, 0]
         if scene.textures:
             corners = scene.mesh.coordinates[scene.mesh.faces[raster.triangle[origin]]]
             corners = corners - corners[:, :1]

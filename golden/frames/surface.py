@@ -248,13 +248,9 @@ def span_attributes(scene: Scene, cut: Raster, albedo: Albedo) -> SpanAttributes
         share = of / total[:, np.newaxis]
         parts = []
         if albedo.colors:
-            of_corners = mesh.colors[corners] if mesh.colors.size else np.ones((len(corners), 3, 3))
-            parts.append(np.clip(np.einsum("sn,snk->sk", share, of_corners), 0, 1))
+            parts.append(np.clip(np.einsum("sn,snk->sk", share, mesh.given_colors[corners]), 0, 1))
         if albedo.texture is not None:
-            of_corners = (
-                mesh.coordinates[corners] if mesh.coordinates.size else np.zeros((len(corners), 3, 2))
-            )
-            places = np.einsum("sn,snk->sk", share, of_corners) * size
+            places = np.einsum("sn,snk->sk", share, mesh.given_coordinates[corners]) * size
             parts.append(np.clip(places, -limits, size + limits))
         ends.append(np.concatenate(parts, axis=1))
     left, right = ends

@@ -192,11 +192,9 @@ def _surface_of(scene: Scene, surface: AttributeSpans) -> np.ndarray:
     """Attributes at the corners of each face, shape (faces, 3, attributes)."""
     mesh, found = scene.mesh, []
     if surface.colors:
-        colors = mesh.colors if mesh.colors.size else np.ones((len(mesh.vertices), 3))
-        found.append(np.clip(colors, 0, 1))
+        found.append(mesh.given_colors)
     if surface.coordinates:
-        given = mesh.coordinates if mesh.coordinates.size else np.zeros((len(mesh.vertices), 2))
-        found.append(given)
+        found.append(mesh.given_coordinates)
     corners: np.ndarray = np.concatenate(found, axis=1)[mesh.faces]
     return corners
 

@@ -37,7 +37,7 @@ class QuotientInterpolator(Interpolator):
 
     A source of spans has to halve a span of three pixels or more, and to split a span of two pixels, if
 
-    - the lengths of v at its ends differ by more than a factor of `LARGEST_RATIO`;
+    - the lengths of v at its ends differ by more than a factor of `ENDS_RATIO`;
     - or the angle between the ends is over 90 degrees.
 
     Then ``|v|`` is at least ``1/(2 sqrt(5))`` at every pixel, in the scale of the words. `SpanHalver` cuts by
@@ -57,7 +57,7 @@ class QuotientInterpolator(Interpolator):
     COSINE_FORMAT = Quotient.COSINE_FORMAT
     MAX_ANGLE = 180.0
     CURVE = "normalised"
-    LARGEST_RATIO: ClassVar[float] = 2.0
+    ENDS_RATIO: ClassVar[float] = 2.0
     SHORTEST: ClassVar[float] = 1 / (2 * 5**0.5)
 
     @property
@@ -169,8 +169,8 @@ class QuotientInterpolator(Interpolator):
         return light_frames(scene, 1)[0].axes_for(highlights) if lights else None
 
     def cut(self, cutter: SpanCutter) -> tuple[Raster, int]:
-        """Spans cut until N/W at one end is at most `LARGEST_RATIO` times as long as at the other end."""
-        return cutter.by_ends(self.LARGEST_RATIO)
+        """Spans cut until N/W at one end is at most `ENDS_RATIO` times as long as at the other end."""
+        return cutter.by_ends(self.ENDS_RATIO)
 
     def least_cut(self, cutter: SpanCutter) -> Raster:
         """Spans of two pixels become two spans of one pixel, because their step would not fit."""

@@ -33,7 +33,7 @@ class RenormaliseInterpolator(NormalInterpolator):
     of the normal's length counts there only at second order.
 
     The longer end has length 1. Rounding to words turns a vector of length m by up to
-    ``(LineSetup.ERROR + sqrt(3) 2^-23)/m``. At `LARGEST_RATIO`, where m = 1/64, this is 2.7e-5 radians, 0.17
+    ``(LineSetup.ERROR + sqrt(3) 2^-23)/m``. At `PIXEL_RATIO`, where m = 1/64, this is 2.7e-5 radians, 0.17
     LSB on the steepest flank of n = 1000. Spans with shorter vectors must be cut. Such vectors occur if W
     differs much between the ends, or if the ends are nearly opposite. If every component of a pixel's vector
     is under 1/256, the span is flagged, and the pixel is wrong.
@@ -53,7 +53,7 @@ class RenormaliseInterpolator(NormalInterpolator):
 
     operand: Operand = "one_minus_cosine"
 
-    LARGEST_RATIO: ClassVar[float] = 64.0
+    PIXEL_RATIO: ClassVar[float] = 64.0
     END_FORMAT = Renormaliser.VECTOR_FORMAT
     MAX_ANGLE = 180.0
     CURVE = "normalised"
@@ -95,8 +95,8 @@ class RenormaliseInterpolator(NormalInterpolator):
         return Geometry(lines=True)
 
     def cut(self, cutter: SpanCutter) -> tuple[Raster, int]:
-        """Spans cut where a pixel's vector is shorter than `LARGEST_RATIO` allows."""
-        return cutter.by_length(self.LARGEST_RATIO)
+        """Spans cut where a pixel's vector is shorter than `PIXEL_RATIO` allows."""
+        return cutter.by_length(self.PIXEL_RATIO)
 
     def filled(self, filler: SpanFiller) -> Spans:
         """Spans with the ends of the true line."""

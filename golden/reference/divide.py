@@ -7,9 +7,9 @@ import numpy as np
 from blysk.golden.reference.geometry import Mesh
 from blysk.golden.reference.scene import Scene
 
-__all__ = ["LARGEST_RATIO", "divided"]
+__all__ = ["EDGE_DEPTH_RATIO", "divided"]
 
-LARGEST_RATIO = 1.4
+EDGE_DEPTH_RATIO = 1.4
 """Largest ratio of the depths at the ends of an edge. The texel step goes with its square at most."""
 
 _MOST_TIMES = 40
@@ -19,10 +19,10 @@ _MOST_TIMES = 40
 def divided(scene: Scene) -> Scene:
     """The scene with triangles divided so that each needs hardly more than a level of its texture.
 
-    Edges are halved in space until their ends have depths within `LARGEST_RATIO`. An edge beyond a border of
-    the picture, or before the near plane, stays whole. Only the ends decide. So triangles that share an edge
-    share its parts, and no pixel between them is lost. A new vertex has the means of normals, colours and
-    texture coordinates of the ends. So the surface stays the same. A scene without levels of textures, or
+    Edges are halved in space until their ends have depths within `EDGE_DEPTH_RATIO`. An edge beyond a border
+    of the picture, or before the near plane, stays whole. Only the ends decide. So triangles that share an
+    edge share its parts, and no pixel between them is lost. A new vertex has the means of normals, colours
+    and texture coordinates of the ends. So the surface stays the same. A scene without levels of textures, or
     without perspective, does not change.
 
     Parameters
@@ -54,7 +54,7 @@ def _halved(scene: Scene, mesh: Mesh) -> Mesh:
     edges, edge = np.unique(ends.reshape(-1, 2), axis=0, return_inverse=True)
     edge = edge.reshape(-1, 3)
     first, last = depth[edges].T
-    wide = np.maximum(first, last) > LARGEST_RATIO * np.minimum(first, last)
+    wide = np.maximum(first, last) > EDGE_DEPTH_RATIO * np.minimum(first, last)
     wide &= ~beyond[edges].all(axis=1).any(axis=1)
     if not wide.any():
         return mesh

@@ -31,7 +31,8 @@ class Mesh:
     colors : float64 array, shape (V, 3), optional
         Colours of the vertices in linear light, 0 to 1. Empty: none, which is white.
     coordinates : float64 array, shape (V, 2), optional
-        Texture coordinates u and v of the vertices, see `Texture`, within `LARGEST_COORDINATE`. Empty: none.
+        Texture coordinates u and v of the vertices, see `Texture`, within `LARGEST_COORDINATE`. Empty: none,
+        which is 0.
     alpha : float64 array, shape (V,), optional
         Alpha of the vertices, 0 to 1, which a material with a cutoff reads. Empty: none, which is 1.
 
@@ -75,6 +76,16 @@ class Mesh:
                 f"material must be an index of 0 or more for each of the {len(self.faces)} faces, or empty"
             )
         self._check_looks()
+
+    @property
+    def given_colors(self) -> np.ndarray:
+        """Colours of the vertices, shape (V, 3); white without colours."""
+        return self.colors if self.colors.size else np.ones((len(self.vertices), 3))
+
+    @property
+    def given_coordinates(self) -> np.ndarray:
+        """Texture coordinates of the vertices, shape (V, 2); 0 without coordinates."""
+        return self.coordinates if self.coordinates.size else np.zeros((len(self.vertices), 2))
 
     def _check_looks(self) -> None:
         """Refuse colours, texture coordinates and alpha of another shape, or out of range."""

@@ -6,7 +6,7 @@ from fractions import Fraction
 import numpy as np
 import pytest
 
-from blysk.golden.albedo.attribute_spans import LARGEST_RATIO, AttributeSpans, SpanAttributes
+from blysk.golden.albedo.attribute_spans import WORD_DEPTH_RATIO, AttributeSpans, SpanAttributes
 from blysk.golden.number.spans import pixels_of
 
 from .ends import ends_of
@@ -39,7 +39,7 @@ def test_words_are_the_rounded_lines_of_the_codes():
     assert (words.level == span).all()
 
 
-@pytest.mark.parametrize("ratio", [1, 2, 4, 16, 1e4, LARGEST_RATIO])
+@pytest.mark.parametrize("ratio", [1, 2, 4, 16, 1e4, WORD_DEPTH_RATIO])
 def test_words_are_within_their_bound_and_do_not_wrap(ratio):
     rng = np.random.default_rng(int(ratio))
     length = np.r_[np.repeat(LENGTHS[:-1], 40), 4095]

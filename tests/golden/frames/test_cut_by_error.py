@@ -191,7 +191,7 @@ def test_cut_spans_chooses():
         if interpolator.lights_cut:
             expected = cut_by_error(scene, raster, interpolator)
         elif not interpolator.brings_ends:
-            expected = cut_by_ends(raster, interpolator.LARGEST_RATIO)
+            expected = cut_by_ends(raster, interpolator.ENDS_RATIO)
         else:
             expected = cut_by_angle(raster, widest)
         assert count == expected[1]

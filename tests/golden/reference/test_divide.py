@@ -9,7 +9,7 @@ import pytest
 from blysk.golden.albedo.attribute_spans import AttributeSpans
 from blysk.golden.geometry.scene_triangles import scene_triangles
 from blysk.golden.reference.camera import Camera
-from blysk.golden.reference.divide import LARGEST_RATIO, divided
+from blysk.golden.reference.divide import EDGE_DEPTH_RATIO, divided
 from blysk.golden.reference.geometry import Mesh
 from blysk.golden.reference.light import Light
 from blysk.golden.reference.lighting import Material
@@ -73,7 +73,7 @@ def test_edges_in_the_picture_have_near_depths():
     scene = divided(floor((0, 1, 12)))
     depth = scene.camera.homogeneous(scene.mesh.vertices, scene.width, scene.height)[:, 2]
     of = depth[scene.mesh.faces]
-    assert (of.max(axis=1) <= LARGEST_RATIO**2 * of.min(axis=1)).mean() > 0.9
+    assert (of.max(axis=1) <= EDGE_DEPTH_RATIO**2 * of.min(axis=1)).mean() > 0.9
     assert depth.max() / depth.min() > 5
 
 
