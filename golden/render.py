@@ -16,6 +16,7 @@ from blysk.golden.geometry.mirror_adapter import MirrorAdapter
 from blysk.golden.geometry.span_adapter import LineSpans, shading_spans
 from blysk.golden.geometry.triangles import FrameSettings, Triangles
 from blysk.golden.geometry.vector_adapter import VectorSpans
+from blysk.golden.geometry.vertex_sort import TESTED
 from blysk.golden.pipeline import ShadingPipeline
 
 __all__ = ["DrawnPixels", "Renderer"]
@@ -102,6 +103,8 @@ class Renderer:
         if self.geometry.gives != suits.gives:
             taken, given = suits.gives, self.geometry.gives
             raise ValueError(f"method {self.design.method} takes {taken}, the geometry gives {given}")
+        tested = 0 if self.design.build.compact_geometry else TESTED
+        object.__setattr__(self, "geometry", replace(self.geometry, tested=tested))
 
     def _suits(self) -> Geometry:
         """The geometry for the method and the albedo of the design."""

@@ -35,7 +35,7 @@ SELDOM = (
     *("edge_setup", "edge_normals", "gradient_setup", "plane_setup", "plane_assembler", "span_attributes"),
     *("attribute_serialiser", "vertex_sort", "span_clip", "edge_walk", "vector_normaliser", "span_halver"),
     *("texture_address", "texel_memory", "texture_filter", "texture_sampler"),
-    "serial_vectors",
+    *("serial_vectors", "serial_vertex_sort"),
     *("attribute_spans", "attributes", "albedo"),
     *("vector_adapter", "halfway_vector", "mirror_adapter", "light_adapter", "coarse_depth", "depth_tester"),
     *("motion", "draw_commands", "mesh_memory", "vertex_unit", "triangle_assembly", "tmds_encoder"),

@@ -126,8 +126,8 @@ class Stages:
 
     @cached_property
     def drawn(self) -> SortedTriangles:
-        """Result of `VertexSort`."""
-        return VertexSort(self.grid).compute(self.triangles, self.frame)[0]
+        """Result of `VertexSort`, with triangles that its test of centres would drop."""
+        return VertexSort(self.grid, 0).compute(self.triangles, self.frame)[0]
 
     @cached_property
     def edges(self) -> Edges:

@@ -18,7 +18,7 @@ from blysk.golden.geometry.span_clip import ClippedRows, SpanClip
 from blysk.golden.geometry.span_halver import SpanHalver
 from blysk.golden.geometry.triangles import ATTRIBUTE, GRID, FrameSettings, Grid, Triangles
 from blysk.golden.geometry.vector_adapter import VectorAdapter, VectorSpans
-from blysk.golden.geometry.vertex_sort import SortedTriangles, VertexSort
+from blysk.golden.geometry.vertex_sort import TESTED, SortedTriangles, VertexSort
 from blysk.golden.number.fixed import Fixed
 
 __all__ = ["COUNTERS", "Geometry"]
@@ -48,6 +48,8 @@ class Geometry:
         ``vectors``.
     surface : AttributeSpans or None
         Vertex colours and texture coordinates that triangles bring, with 1/W. Only with ``vectors``.
+    tested : int
+        As in `VertexSort`. It changes no span, but triangles that the test drops are not counted as slivers.
 
     Raises
     ------
@@ -63,6 +65,7 @@ class Geometry:
     vectors: bool = False
     rotates: bool = False
     surface: AttributeSpans | None = None
+    tested: int = TESTED
 
     def __post_init__(self) -> None:
         if self.lines and self.vectors:
@@ -82,7 +85,7 @@ class Geometry:
         self, triangles: Triangles, frame: FrameSettings
     ) -> tuple[SortedTriangles, ClippedRows, np.ndarray, dict[str, int]]:
         """Sorted triangles, clipped scanlines with the index of their triangle, and the counts so far."""
-        drawn, counts = VertexSort(self.grid).compute(triangles, frame)
+        drawn, counts = VertexSort(self.grid, self.tested).compute(triangles, frame)
         edges = EdgeSetup(self.grid).compute(drawn)
         rows = EdgeWalk().compute(edges, drawn, frame)
         clipped = SpanClip().compute(rows, frame)

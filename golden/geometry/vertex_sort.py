@@ -6,7 +6,13 @@ import numpy as np
 
 from blysk.golden.geometry.triangles import GRID, FrameSettings, Grid, Triangles
 
-__all__ = ["SortedTriangles", "VertexSort"]
+__all__ = ["FACTOR_BITS", "TESTED", "SortedTriangles", "VertexSort"]
+
+FACTOR_BITS = 18
+"""Bits of a factor of a multiplier."""
+
+TESTED = 4
+"""Centres in the largest box whose centres are tested before the setup, in the throughput style."""
 
 
 @dataclass(frozen=True)
@@ -54,7 +60,9 @@ class VertexSort:
     2. counted as ``zero_area`` and dropped if twice its area,
        ``a = (x1 - x0)(y2 - y0) - (x2 - x0)(y1 - y0)``, is 0;
     3. counted as ``culled`` and dropped if its back is seen, it is not two-sided, and the frame culls back
-       faces. A triangle shows its front if its corners are counterclockwise on the screen.
+       faces. A triangle shows its front if its corners are counterclockwise on the screen;
+    4. counted as ``empty`` and dropped if `misses`: the box has 1 to ``tested`` centres, in the picture or
+       not, and the triangle covers none of them.
 
     The long edge is on the right if a of the sorted corners is negative. All results are exact.
 
@@ -62,16 +70,64 @@ class VertexSort:
     ----------
     grid : Grid
         Fraction bits of the coordinates.
+    tested : int
+        Centres in the largest box whose centres are tested: `TESTED`, or 0 in the compact style.
 
     Source: docs/theory/geometry.md#coverage; [T] figure 4.10.
     """
 
     grid: Grid = GRID
+    tested: int = TESTED
 
     def order(self, triangles: Triangles) -> np.ndarray:
         """Indices of the corners sorted by y, then x, shape (T, 3). Equal corners stay in their order."""
         key = (triangles.y << (self.grid.bits + 1)) + triangles.x
         return np.argsort(key, axis=1, kind="stable")
+
+    def misses(self, triangles: Triangles) -> np.ndarray:
+        """Whether a triangle with an area has a box of 1 to ``tested`` centres and covers none.
+
+        A centre is covered if it is inside, or on a left or a top edge.
+
+        Returns
+        -------
+        misses : bool array, shape (T,)
+        """
+        grid = self.grid
+        corners = np.stack((triangles.x, triangles.y))
+        low, high = (grid.first_centre(f(corners, axis=2)) for f in (np.min, np.max))
+        extent = high - low
+        small = np.flatnonzero((extent > 0).all(axis=0) & (extent.prod(axis=0) <= self.tested))
+        (x, y), first, extent = corners[:, small], low[:, small], extent[:, small]
+        dx, dy = (np.roll(values, -1, axis=1) - values for values in (x, y))
+        turn = np.sign(dx[:, :1] * dy[:, 1:2] - dx[:, 1:2] * dy[:, :1])
+        dx, dy = dx * turn, dy * turn
+        counts = (dy < 0) | ((dy == 0) & (dx > 0))
+        covered = np.zeros(len(small), dtype=bool)
+        for column, row in np.ndindex(self.tested, self.tested):
+            cx, cy = (
+                ((start + k) * grid.steps + grid.half)[:, np.newaxis]
+                for start, k in zip(first, (column, row), strict=True)
+            )
+            edges = dx * (cy - y) - dy * (cx - x)
+            inside = ((edges > 0) | ((edges == 0) & counts)).all(axis=1)
+            covered |= inside & (column < extent[0]) & (row < extent[1])
+        result = np.zeros(len(triangles), dtype=bool)
+        result[small] = ~covered
+        return result
+
+    def cycles(self, triangles: Triangles) -> np.ndarray:
+        """Cycles from each triangle to the next in the throughput style, int64 array, shape (T,).
+
+        Every triangle takes one cycle, drawn or dropped. A triangle takes four if a difference of
+        coordinates, from its first corner to another, has more than `FACTOR_BITS` bits: each product then
+        has four parts. The sort waits longer if drawn triangles wait behind it.
+        """
+        across, down = (values[:, 1:] - values[:, :1] for values in (triangles.x, triangles.y))
+        differences = np.concatenate((across, down), axis=1)
+        half = 1 << (FACTOR_BITS - 1)
+        wide = ((differences < -half) | (differences >= half)).any(axis=1)
+        return np.where(wide, 4, 1)
 
     def compute(self, triangles: Triangles, frame: FrameSettings) -> tuple[SortedTriangles, dict[str, int]]:
         """Triangles to draw, and the counts of the dropped triangles.
@@ -118,11 +174,13 @@ class VertexSort:
         back = (area > 0) ^ odd
         solid = area != 0
         culls = frame.back_faces == "cull"
-        drawn = solid & ~(back & culls & (kept.two_sided == 0))
+        shown = solid & ~(back & culls & (kept.two_sided == 0))
+        missed = shown & self.misses(kept)
+        drawn = shown & ~missed
         counts = {
-            "empty": len(triangles) - len(kept),
+            "empty": len(triangles) - len(kept) + int(missed.sum()),
             "zero_area": int((~solid).sum()),
-            "culled": int((solid & ~drawn).sum()),
+            "culled": int((solid & ~shown).sum()),
         }
         result = SortedTriangles(
             triangles=kept[drawn],

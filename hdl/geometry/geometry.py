@@ -1,5 +1,7 @@
 """Geometry ([T] figure 4.10): triangles to spans."""
 
+from dataclasses import replace
+
 from amaranth.hdl import Array, Module, Signal, Value, unsigned
 from amaranth.lib import data, stream, wiring
 from amaranth.lib.wiring import In, Out
@@ -22,6 +24,7 @@ from blysk.hdl.geometry.gradient_setup import GradientSetupUnit
 from blysk.hdl.geometry.plane_assembler import PlaneAssemblerUnit, plane_shape, planes_shape
 from blysk.hdl.geometry.plane_setup import PlaneSetupUnit, scales_shape
 from blysk.hdl.geometry.serial_vectors import SerialVectorsUnit
+from blysk.hdl.geometry.serial_vertex_sort import SerialVertexSortUnit
 from blysk.hdl.geometry.span_adapter import LineAdapterUnit, line_spans_shape
 from blysk.hdl.geometry.span_attributes import SpanAttributesUnit
 from blysk.hdl.geometry.span_clip import SpanClipUnit
@@ -31,7 +34,7 @@ from blysk.hdl.geometry.triangles import counters_shape, frame_shape, triangle_s
 from blysk.hdl.geometry.vector_adapter import VectorAdapterUnit, vector_spans_shape
 from blysk.hdl.geometry.vertex_sort import VertexSortUnit, sorted_triangle_shape
 
-__all__ = ["PORT_DESCRIPTIONS", "WAITING_TRIANGLES", "GeometryUnit"]
+__all__ = ["PORT_DESCRIPTIONS", "GeometryUnit"]
 
 PORT_DESCRIPTIONS = {
     "normal_left": "first pixel: unit normal (in SQ(1, 17)) or N/W of a true line (in SQ(1, 22))",
@@ -57,13 +60,6 @@ PORT_DESCRIPTIONS = {
     "material": "index of the triangle's material",
 }
 """Fields of a span, for the table in Verilog."""
-
-WAITING_TRIANGLES = 512
-"""Triangles between sort and setup, in block RAMs, in the throughput style.
-
-Dropped triangles come in runs. Where a mesh shows its back, a run may have hundreds of triangles. During a
-run the setup works on the waiting triangles.
-"""
 
 BLOCK_WORDS = 64
 """Least number of words of a memory in a block RAM. A memory of fewer words takes look-up tables."""
@@ -168,7 +164,7 @@ class GeometryUnit(wiring.Component):
 
     The unit has the units of this package in a row. The corners of a sorted triangle go to the edge setup.
     They also go to a FIFO, one attribute after the other. There the attributes wait for the scales of their
-    triangle. The edges wait in a FIFO for the planes of their triangle. With two lanes a triangle waits
+    triangle. The edges wait in a FIFO for the planes of their triangle. With several lanes a triangle waits
     before each lane, so no lane keeps the other lane from its turn.
 
     In the *compact* style one divider serves all edges. One multiplier serves the gradients of all
@@ -181,7 +177,8 @@ class GeometryUnit(wiring.Component):
 
     - in the setup `interval` cycles if it is drawn: 16, or 48 in the compact style, and half as many with two
       lanes. Each attribute of a surface, and its 1/W, adds 4 cycles, or 12 in the compact style. A triangle
-      that the sort drops takes 4 to 9 cycles, or 5 to 15 in the compact style (`VertexSortUnit`);
+      that the sort drops takes a cycle (`VertexSortUnit`), or 5 to 15 in the compact style
+      (`SerialVertexSortUnit`);
     - in the walk `row_cycles` for each scanline without pixels in the picture: 1, or the number of attributes
       in the compact style;
     - for a span or piece of p pixels as many cycles as ``p - 1`` has bits. The least is 1 cycle for 1 pixel,
@@ -194,8 +191,8 @@ class GeometryUnit(wiring.Component):
       piece takes 13 cycles or more at the same time, and with a surface 3 more for each of its attributes
       (`SerialVectorsUnit`).
 
-    The number of multipliers is `multipliers`: 10, or 5 in the compact style. With ``lines`` or ``vectors``
-    it is 4, or 2 in the compact style. The second lane adds 4, or 2 in the compact style.
+    The number of multipliers is `multipliers`: 16, or 5 in the compact style. With ``lines`` or ``vectors``
+    it is 10, or 2 in the compact style. The second lane adds 4, or 2 in the compact style.
 
     Parameters
     ----------
@@ -227,14 +224,16 @@ class GeometryUnit(wiring.Component):
     """
 
     def __init__(self, model: Geometry | None = None, build: Build | None = None):
-        self.model, build = model or Geometry(), build or Build(top="geometry")
-        self.grid, self.compact = self.model.grid, build.compact_geometry
+        model, build = model or Geometry(), build or Build(top="geometry")
+        self.grid, self.compact = model.grid, build.compact_geometry
+        sort = SerialVertexSortUnit if self.compact else VertexSortUnit
+        self.model = replace(model, tested=sort.tested)
         self.row_cycles = attribute_count(self.model.surface) if self.compact else 1
         self.lines, self.vectors = self.model.lines, self.model.vectors
         self.rotates = self.model.rotates
         grid, compact, lines, vectors = self.grid, self.compact, self.lines, self.vectors
         self._surface = surface = self.model.surface
-        self._sort = VertexSortUnit(grid, compact, surface)
+        self._sort = sort(grid, surface)
         self._lanes = [_TriangleSetup(self.model, compact) for _ in range(build.setups)]
         self.interval = -(-self._lanes[0].interval // build.setups)
         self._attributes, self._walk, self._clip = (
@@ -255,7 +254,7 @@ class GeometryUnit(wiring.Component):
         else:
             self._normals, shape = EdgeNormalsUnit(compact=compact), true_spans_shape()
         normaliser = 0 if lines or vectors else self._normals.multipliers
-        self.multipliers = sum(lane.multipliers for lane in self._lanes) + normaliser
+        self.multipliers = sort.multipliers + sum(lane.multipliers for lane in self._lanes) + normaliser
         super().__init__(
             {
                 "i": In(stream.Signature(triangle_shape(grid, surface))),
@@ -294,10 +293,7 @@ class GeometryUnit(wiring.Component):
     def _set_up(self, m: Module) -> tuple[stream.Interface, stream.Interface]:
         """Connect the sort and the lanes. Returns the edges for the walk and the planes, merged in turns."""
         drawn = _between("drawn", self._sort.o)
-        if self.compact:
-            connect(m, self._sort.o, drawn)
-        else:
-            connect_late_fifo(m, "waiting_triangles", self._sort.o, drawn, WAITING_TRIANGLES)
+        connect(m, self._sort.o, drawn)
         drawn = self._put_placement_aside(m, drawn)
         lanes = self._lanes
         if len(lanes) == 1:

@@ -1,14 +1,19 @@
 """Vertex sort ([T] figure 4.10): corners from top to bottom, orientation, and dropped triangles."""
 
-from amaranth.hdl import Cat, Const, Module, Mux, Signal, Value, signed, unsigned
+from collections.abc import Sequence
+
+from amaranth.hdl import Cat, Module, Mux, Signal, Value, signed, unsigned
 from amaranth.lib import data, stream, wiring
+from amaranth.lib.memory import Memory
 from amaranth.lib.wiring import In, Out
 
 from blysk.golden.albedo.attribute_spans import AttributeSpans
-from blysk.golden.geometry.edge_setup import X_BITS
 from blysk.golden.geometry.triangles import GRID, Grid
+from blysk.golden.geometry.vertex_sort import FACTOR_BITS, TESTED
 from blysk.golden.reference.scene import BACK_FACES
-from blysk.hdl.core.views import copy, copy_fields
+from blysk.hdl.core.memory import registered_read
+from blysk.hdl.core.views import copy_fields
+from blysk.hdl.geometry.centre_test import misses_centres, near_bits
 from blysk.hdl.geometry.surface_words import placement_of
 from blysk.hdl.geometry.triangles import (
     corners_shape,
@@ -20,13 +25,23 @@ from blysk.hdl.geometry.triangles import (
     triangle_shape,
 )
 
-__all__ = ["VertexSortUnit", "sorted_triangle_shape"]
+__all__ = ["PAIRS", "WAITING_TRIANGLES", "VertexSortUnit", "sorted_triangle_shape"]
 
-_PAIRS = (0, 1), (1, 2), (0, 2)
+PAIRS = (0, 1), (1, 2), (0, 2)
 """Pairs of corners that are compared: whether the second corner comes before the first."""
 
-DIGIT_BITS = 4
-"""Bits of a height that go into the area on each cycle."""
+WAITING_TRIANGLES = 512
+"""Words of the memory of triangles, in block RAMs.
+
+Dropped triangles come in runs. Where a mesh shows its back, a run may have hundreds of triangles. During a
+run the setup works on the waiting triangles.
+"""
+
+_KEPT = 16
+"""Words of the memory of drawn triangles' results, in look-up tables."""
+
+_RESERVED = 4
+"""Words of the memory of triangles that stay free: writes that its level does not count yet, and one more."""
 
 
 def sorted_triangle_shape(grid: Grid = GRID, surface: AttributeSpans | None = None) -> data.StructLayout:
@@ -38,27 +53,23 @@ def sorted_triangle_shape(grid: Grid = GRID, surface: AttributeSpans | None = No
 class VertexSortUnit(wiring.Component):
     """Sorts corners, finds the area, and drops triangles. `VertexSort` is the bit-accurate model.
 
-    There are two stages, each with a triangle inside. The first stage compares neighbouring corners in three
-    cycles, exchanges them a cycle later, and compares the triangle's box with the picture. The second stage
-    sums ``a = (x1 - x0)(y2 - y0) - (x2 - x0)(y1 - y0)`` in n digits of four bits of the heights, from the
-    first digit on. It takes two Booth digits of each product a cycle. Low triangles have fewer digits.
-    Results are exact. The unit has no multipliers.
+    A triangle is written into a memory when it comes. Only its coordinates go through a pipeline. The
+    pipeline compares the corners, compares the box with the picture, and finds
+    ``a = (x1 - x0)(y2 - y0) - (x2 - x0)(y1 - y0)`` from the corners in the given order. Results of drawn
+    triangles wait in a second memory. A drawn triangle is read from the first memory, and a multiplexer
+    puts its corners in order. So a dropped triangle takes no other unit's time.
 
-    On a grid of 1/256 pixel n depends on the scanlines of a box. It is 3 for up to 6 scanlines, 4 for up to
-    126, 5 for up to 2046, and 6 for more. A triangle takes 4 cycles if its box is empty. Else it takes n + 3
-    cycles if it is dropped, and n + 4 if it is drawn. A waiting output adds cycles. A drawn triangle is
-    offered n + 8 cycles after it was taken in.
-
-    In the *compact* style only one triangle is inside, and its corners stay in the registers of the first
-    stage. It takes 5 cycles if its box is empty, else n + 9 cycles. If it is drawn, it also takes the cycles
-    on which it is offered, at least one.
+    The unit takes a triangle in each cycle, drawn or dropped. `VertexSort.cycles` has the exceptions: if a
+    difference of coordinates is 512 pixels or more, each product takes four cycles, from the halves of its
+    factors. The unit also waits while `WAITING_TRIANGLES` triangles, or 15 drawn triangles, wait in its
+    memories. A drawn triangle is offered 11 cycles after it was taken in, or 14 cycles with four cycles for
+    a product. The unit has six multipliers of 18x18 bits: two for a, and four for the test of centres
+    (`misses_centres`).
 
     Parameters
     ----------
     grid : Grid
         Fraction bits of the coordinates.
-    compact : bool
-        Whether the unit has the compact style.
     surface : AttributeSpans or None
         Attributes of the surface that triangles bring.
 
@@ -76,8 +87,10 @@ class VertexSortUnit(wiring.Component):
     Source: docs/theory/geometry.md#coverage; [T] figure 4.10.
     """
 
-    def __init__(self, grid: Grid = GRID, compact: bool = False, surface: AttributeSpans | None = None):
-        self.grid, self.compact, self.surface = grid, compact, surface
+    multipliers, tested = 6, TESTED
+
+    def __init__(self, grid: Grid = GRID, surface: AttributeSpans | None = None):
+        self.grid, self.surface = grid, surface
         super().__init__(
             {
                 "i": In(stream.Signature(triangle_shape(grid, surface))),
@@ -88,248 +101,239 @@ class VertexSortUnit(wiring.Component):
         )
 
     def elaborate(self, platform):
-        """The two stages and the counters."""
-        m = Module()
-        corners = [Signal(_corner_shape(self.grid, self.surface), name=f"corner_{k}") for k in range(3)]
-        material, odd = Signal.like(self.i.payload.material), Signal(name="odd")
-        places = {
-            name: Signal(shape, name=name, reset_less=True)
-            for name, shape in placement_of(self.surface).items()
-        }
-        two_sided = Signal(name="two_sided")
-        covered, leaves, digits = Signal(name="covered"), Signal(name="leaves"), Signal(3, name="digits")
-        free, ends = Signal(name="area_free"), Signal(name="area_ends")
+        """The pipeline, the memories and the counters."""
+        m, culls = Module(), self.constants.back_faces == BACK_FACES.index("cull")
+        # ``goes``: results have room. Without room all stages stop. ``moves``: the first two stages take
+        # their next triangles. They wait while a triangle needs more products.
+        self._goes, self._moves = goes, moves = Signal(name="goes", init=1), Signal(name="moves")
+        takes, room, given = Signal(name="takes"), Signal(name="room"), self.i.payload
+        m.d.comb += [self.i.ready.eq(room & moves), takes.eq(self.i.valid & self.i.ready)]
+        x, y = (
+            [self._stage(m, Value.cast(given[axis][k]).as_signed(), f"{axis}_{k}", moves) for k in range(3)]
+            for axis in "xy"
+        )
+        columns, rows = (
+            [self._stage(m, v[b] - v[a], f"{axis}_{a}_{b}", moves) for a, b in PAIRS]
+            for axis, v in (("x", x), ("y", y))
+        )
+        there = self._valid(m, self._valid(m, takes, 1, moves), 2, moves)
+        two_sided = self._stage(
+            m, self._stage(m, given.two_sided, "two_sided_1", moves), "two_sided_2", moves
+        )
+        total, last = self._total(m, there, [*columns[::2], *rows[::2]])
+        m.d.comb += moves.eq(goes & (~there | last))
+        there = self._valid(m, there & last, 3)
 
-        step = Signal(3, name="sort_step")
-        given = self.i.payload
-        enters = [
-            step.eq(self.i.valid),
-            material.eq(given.material),
-            odd.eq(0),
-            two_sided.eq(given.two_sided),
-            *(copy(place, given[name]) for name, place in places.items()),
+        # The order of x alone and of y alone is enough for the box. Corners at equal height are ordered by x.
+        across, upwards = ([value[-1] for value in values] for values in (columns, rows))
+        level = [row == 0 for row in rows]
+        before = [
+            self._stage(m, up | (flat & left), f"before_{a}_{b}")
+            for up, flat, left, (a, b) in zip(upwards, level, across, PAIRS, strict=True)
         ]
-        with m.Switch(step):
-            with m.Case(0):
-                m.d.sync += enters
-            with m.Case(4):
-                m.d.sync += step.eq(Mux(covered, 5, 0))
-            with m.Case(5):
-                m.d.comb += leaves.eq(1 if self.compact else free)
-                with m.If(leaves):
-                    m.d.sync += step.eq(6 if self.compact else 0)
-            with m.Case(6), m.If(ends):
-                m.d.sync += step.eq(0)
-            with m.Default():
-                m.d.sync += step.eq(step + 1)
-        takes = step == 0
-        if not self.compact:
-            # The next triangle comes in on the cycle on which a triangle leaves the first stage.
-            takes |= leaves | ((step == 4) & ~covered)
-        m.d.comb += self.i.ready.eq(takes)
-        order = self._exchange(m, corners, odd, step, takes)
-        if not self.compact:
-            with m.If(takes):
-                m.d.sync += enters
-        self._box(m, corners, order, step, covered, digits)
-        zero, culled = self._area(m, corners, (material, two_sided, places), odd, digits, leaves, free, ends)
-        count_events(m, self.status, empty=(step == 4) & ~covered, zero_area=zero, culled=culled)
+        box, inside = zip(
+            self._box(m, "x", x, across, ("left", "right")),
+            self._box(m, "y", y, upwards, ("top", "bottom")),
+            strict=True,
+        )
+        missed = self._missed(m, (x[0], y[0]), (columns, rows), (across, level, upwards), box, total)
+        two_sided = self._stage(m, two_sided, "two_sided_3")
+        tag = Cat(Cat(inside).all(), two_sided, before[0] ^ before[1] ^ before[2], *_ends(before, (0, 1, 2)))
+        for number in range(4, 9):
+            there, tag = self._valid(m, there, number), self._stage(m, tag, f"tag_{number}")
+        covered, two_sided, odd, first, final = tag[0], tag[1], tag[2], tag[3:5], tag[5:7]
+
+        negative, zero, area = total[-1], ~total.any(), Mux(total[-1], -total, total)[: 2 * self.grid.bits]
+        for number in (7, 8):
+            negative, zero, area = (
+                self._stage(m, value, f"{name}_{number}")
+                for name, value in (("negative", negative), ("zero", zero), ("area", area))
+            )
+        back, flips = ~(negative | zero), self.constants.back_faces == BACK_FACES.index("flip")
+        culled, decides = back & culls & ~two_sided, there & goes
+        found = Signal(self._found_shape(), name="found")
+        m.d.comb += [
+            *(found.first.eq(first), found.last.eq(final), found.area.eq(area)),
+            *(found.right.eq(negative ^ odd), found.flip.eq(back & (flips | culls))),
+        ]
+        solid = covered & ~zero & ~culled
+        self._keep(m, takes, room, decides, solid & ~missed, found)
+        count_events(
+            m,
+            self.status,
+            empty=decides & (~covered | (solid & missed)),
+            zero_area=decides & covered & zero,
+            culled=decides & covered & culled,
+        )
         return m
 
-    def _exchange(self, m: Module, corners: list, odd: Signal, step: Signal, takes: Value) -> list[Signal]:
-        """Take corners in, and exchange neighbours that are in the wrong order.
+    def _stage(self, m: Module, value: Value, name: str, enable: Value | None = None) -> Signal:
+        """The value in a register of the next stage."""
+        kept = Signal(value.shape(), name=name, reset_less=True)
+        with m.If(self._goes if enable is None else enable):
+            m.d.sync += kept.eq(value)
+        return kept
 
-        Returns the comparisons of `_PAIRS`. On the second cycle these are the comparisons of the corners in
-        the given order.
+    def _valid(self, m: Module, value: Value, number: int, enable: Value | None = None) -> Signal:
+        """Whether a triangle is in the stage of this number."""
+        kept = Signal(name=f"valid_{number}")
+        with m.If(self._goes if enable is None else enable):
+            m.d.sync += kept.eq(value)
+        return kept
 
-        Corners 0 and 1 are exchanged first, then 1 and 2, then 0 and 1 again. All three pairs are compared on
-        the first cycle, before any exchange. The exchanges so far decide which comparison the next exchange
-        needs.
-        """
-        turn, same, other = (Signal(name=name) for name in ("turn", "same", "other"))
-        # The sign bit of x is inverted, so that y and x together are one signed number.
-        columns = [Value.cast(corner.x) for corner in corners]
-        key = [
-            Cat(x[:-1], ~x[-1], Value.cast(corner.y)).as_signed()
-            for x, corner in zip(columns, corners, strict=True)
+    def _missed(self, m: Module, corner: tuple, differences: tuple, signs: tuple, box: tuple, total: Value):
+        """Whether the triangle of stage 8 has a box of 1 to 4 centres, and covers none (`misses_centres`)."""
+        bits, (across, level, upwards) = near_bits(self.grid), signs
+
+        def stage(value, name):
+            return self._stage(m, value, name)
+
+        corner = [
+            stage(self._stage(m, code[:bits], f"corner_{axis}_2", self._moves), f"corner_{axis}_3")
+            for axis, code in zip("xy", corner, strict=True)
         ]
-        # ``same`` and ``other`` compare the last corner with the second corner and with the first corner.
-        with m.If(step == 1):
-            # A subtraction gets a carry chain. The mapper would make look-up tables of a comparison.
-            for flag, (upper, lower) in zip((turn, same, other), _PAIRS, strict=True):
-                m.d.sync += flag.eq((key[lower] - key[upper])[-1])
-        with m.Elif(step == 2):
-            m.d.sync += [turn.eq(Mux(turn, other, same)), other.eq(Mux(turn, same, other))]
-        with m.Else():
-            m.d.sync += turn.eq(turn & other)
-        outer, inner = (step == 2) | (step == 4), step == 3
-        with m.If(turn & (outer | inner)):
-            m.d.sync += odd.eq(~odd)
-        first, second, third = (Value.cast(corner) for corner in corners)
-        following = second, Mux(inner, third, first), second
-        given = self.i.payload
-        moving = outer, outer | inner, inner
-        for k, (corner, neighbour, moves) in enumerate(zip(corners, following, moving, strict=True)):
-            taken = Cat(Value.cast(given[name][k]) for name in corner.shape().members)
-            with m.If(takes | (turn & moves)):
-                m.d.sync += Value.cast(corner).eq(Mux(takes, taken, neighbour))
-        return [turn, same, other]
+        near = [
+            stage(value[:bits], f"near_{axis}_{k}")
+            for axis, values in zip("xy", differences, strict=True)
+            for k, value in enumerate(values[::2])
+        ]
+        inclusive = [
+            stage(Mux(flat, ~left, up), f"inclusive_{a}_{b}")
+            for left, flat, up, (a, b) in zip(across, level, upwards, PAIRS, strict=True)
+        ]
+        return misses_centres(stage, self.grid, corner, near, inclusive, box, total)
 
-    def _box(
-        self, m: Module, corners: list, order: list, step: Signal, covered: Signal, digits: Signal
-    ) -> None:
-        """Whether the box and the picture have a pixel's centre in common, and the digits of the height.
+    def _box(self, m: Module, axis: str, corners: list, order: list, ends: tuple[str, str]) -> tuple:
+        """First column (scanline) and the first after the box in stage 3, and whether the picture has a part.
 
         The corners' order stands for the order of their centres. So the comparisons do not wait for the sums
         of `first_centre`.
         """
-        frame, inside = self.constants, []
-        columns = [Value.cast(corner.x).as_signed() for corner in corners]
-        across = [Signal(name=f"across_{upper}_{lower}") for upper, lower in _PAIRS]
-        for flag, (upper, lower) in zip(across, _PAIRS, strict=True):
-            m.d.sync += flag.eq((columns[lower] - columns[upper])[-1])
-        for name, first, end, flags in (
-            ("x", frame.left, frame.right, across),
-            ("y", frame.top, frame.bottom, order),
-        ):
-            centres = [Signal(signed(X_BITS), name=f"centre_{name}_{k}") for k in range(3)]
-            for centre, corner in zip(centres, corners, strict=True):
-                m.d.sync += centre.eq(first_centre(corner[name], self.grid))
-            turn, same, other = flags
-            low, high = (Signal(signed(X_BITS), name=f"{end}_{name}") for end in ("low", "high"))
-            m.d.sync += [
-                low.eq(Mux(turn, Mux(same, centres[2], centres[1]), Mux(other, centres[2], centres[0]))),
-                high.eq(Mux(turn, Mux(other, centres[0], centres[2]), Mux(same, centres[1], centres[2]))),
-            ]
-            inside += [low < high, low < end, first < high]
-        rows = high - low
-        with m.If(step == 3):
-            m.d.sync += [covered.eq(Cat(inside).all()), digits.eq(_largest_digits(self.grid))]
-            for count in reversed(range(3, _largest_digits(self.grid))):
-                with m.If(rows < _rows_of(count, self.grid)):
-                    m.d.sync += digits.eq(count)
-
-    def _area(self, m, corners, tag, odd, digits, leaves, free, ends) -> tuple[Value, Value]:
-        """The second stage. Returns whether a triangle without area ends now, and whether a culled triangle
-        ends now.
-
-        ``tag`` has the index of the material, whether the triangle is two-sided, and the place of its
-        texture.
-        """
-        (material, is_two_sided, places), two_sided = tag, Signal(name="two_sided_area")
-        grid, result = self.grid, self.o.payload
-        members = corners_shape(grid, self.surface) | {"material": material.shape()}
-        words = Signal(data.StructLayout(members | placement_of(self.surface)), name="sorted")
-        total_bits, most = 2 * grid.bits + 1, _largest_digits(grid)
-        total = Signal(signed(total_bits), name="total")
-        left, busy, done, odd_area = Signal(3), Signal(name="busy"), Signal(name="done"), Signal()
-        x, y = ([Value.cast(corner[name]) for corner in corners] for name in "xy")
-        terms = []
-        for k, (across, height) in enumerate(((1, 2), (2, 1))):
-            width = Signal(signed(grid.bits + 1), name=f"width_{k}")
-            # One more bit below is for the first Booth digit.
-            rest = Signal(DIGIT_BITS * most + 1, name=f"rest_{k}")
-            down = (y[height] - y[0])[: grid.bits]
-            with m.If(leaves):
-                m.d.sync += width.eq(x[across] - x[0])
-                for count in range(3, most + 1):
-                    with m.If(digits == count):
-                        m.d.sync += rest.eq(Cat(Const(0, 1 + DIGIT_BITS * (most - count)), down))
-            with m.Else():
-                m.d.sync += rest.eq(rest << DIGIT_BITS)
-            # The second product is subtracted: its digits have the other sign. The 1 of each negation is
-            # added with the term, in bits of the total that are 0.
-            (high, high_minus), (low, low_minus) = (
-                _booth_digit(width, rest[-size:][:3], bool(k)) for size in (3, 5)
-            )
-            term = Signal(signed(grid.bits + DIGIT_BITS + 1), name=f"term_{k}")
-            minus = Signal(2, name=f"minus_{k}")
-            m.d.sync += [term.eq((high << 2) + low), minus.eq(Cat(low_minus, high_minus))]
-            terms.append((term, minus))
-
-        sums, drops = Signal(name="sums"), Signal(name="drops")
-        m.d.sync += sums.eq(busy)
-        with m.If(leaves):
-            m.d.sync += [busy.eq(1), left.eq(digits - 1), total.eq(0)]
-        with m.Elif(busy):
-            m.d.sync += [left.eq(left - 1), busy.eq(left != 0)]
-        kept = [
-            *(odd_area.eq(odd), two_sided.eq(is_two_sided), words.material.eq(material)),
-            *self._sorted(words, corners),
-            *(copy(words[name], place) for name, place in places.items()),
+        centres = [
+            self._stage(m, first_centre(corner, self.grid), f"centre_{axis}_{k}", self._moves)
+            for k, corner in enumerate(corners)
         ]
-        if self.compact:
-            m.d.comb += kept
-        else:
-            with m.If(leaves):
-                m.d.sync += kept
-        with m.If(sums):
-            (first, a), (second, b) = terms
-            ones = Cat(
-                bit for pair in zip(a, b, strict=True) for bit in (pair[0] ^ pair[1], pair[0] & pair[1])
-            )
-            m.d.sync += total.eq(Cat(ones, total) + first + second)
-        found, positive, zero = (Signal(name=name) for name in ("found", "positive", "zero"))
-        flags = [positive.eq(~total[-1]), zero.eq(~total.any())]
-        if self.compact:
-            # The sign of the area, and whether the area is 0, are registers.
-            m.d.sync += [found.eq(sums & ~busy), done.eq(found), *flags]
-        else:
-            m.d.sync += done.eq(sums & ~busy)
-            m.d.comb += flags
+        low, high = (
+            self._stage(m, end.as_signed(), f"{name}_{axis}")
+            for end, name in zip(_ends(order, centres), ("low", "high"), strict=True)
+        )
+        begin, end = (self.constants[name] for name in ends)
+        return (low, high), Cat(low < high, low < end, begin < high).all()
 
-        back = (positive & ~zero) ^ odd_area
-        culls, flips = (self.constants.back_faces == BACK_FACES.index(name) for name in ("cull", "flip"))
-        culled = back & culls & ~two_sided
-        valid = Signal(name="valid")
-        m.d.comb += [drops.eq(zero | culled), free.eq(~(busy | sums | found | done | valid))]
-        m.d.comb += ends.eq((done & drops) | (valid & self.o.ready))
-        area, right, flip = (Signal.like(result[name], name=name) for name in ("area", "right", "flip"))
-        with m.If(done):
+    def _total(self, m: Module, there: Value, differences: list) -> tuple[Signal, Value]:
+        """``a`` of stage 6 from differences of stage 2, and whether the triangle leaves stage 2.
+
+        Let h and l be the upper and the lower half of a difference, ``h 2^17 + l``. The four parts of a wide
+        product are ``h h'``, ``h l'``, ``l h'`` and ``l l'``.
+        """
+        half, bits = FACTOR_BITS - 1, 2 * self.grid.bits + 1
+        part, wide = Signal(2, name="part"), Signal(name="wide")
+        if len(differences[0]) > FACTOR_BITS:
+            ends = [value[half:] for value in differences]
+            m.d.comb += wide.eq(Cat(end.any() & ~end.all() for end in ends).any())
+            with m.If(there & wide & self._goes):
+                m.d.sync += part.eq(part + 1)
+
+        def factor(value, upper, name):
+            if len(value) <= FACTOR_BITS:
+                return self._stage(m, value, name)
+            lower = Cat(value[:half], value[half] & ~wide).as_signed()
+            return self._stage(m, Mux(upper & wide, value[half:].as_signed(), lower).as_signed(), name)
+
+        x_01, x_02, y_01, y_02 = differences
+        products = [
+            self._stage(
+                m,
+                factor(wide_x, ~part[1], f"width_{k}") * factor(wide_y, ~part[0], f"height_{k}"),
+                f"product_{k}",
+            )
+            for k, (wide_x, wide_y) in enumerate(((x_01, y_02), (x_02, y_01)))
+        ]
+        change = self._stage(m, products[0] - products[1], "change")
+        total = Signal(signed(bits), name="total")
+        # Parts 1 and 3 come after a shift. Part 0 begins a sum.
+        begins, shifts = ~(part[0] | part[1]), part[0]
+        for number in range(3, 6):
+            begins, shifts = (
+                self._stage(m, bit, f"{name}_{number}")
+                for bit, name in ((begins, "begins"), (shifts, "shifts"))
+            )
+        sum_ = Mux(begins, 0, Mux(shifts, total.shift_left(half), total)[:bits])
+        with m.If(self._goes):
+            m.d.sync += total.eq(sum_ + change)
+        return total, ~wide | part.all()
+
+    def _found_shape(self) -> data.StructLayout:
+        """Results of a drawn triangle: indices of the first and the last corner, the tag, twice the area."""
+        corners = {"first": unsigned(2), "last": unsigned(2)}
+        flags = {"right": unsigned(1), "flip": unsigned(1)}
+        return data.StructLayout(corners | flags | {"area": unsigned(2 * self.grid.bits)})
+
+    def _keep(self, m: Module, takes: Value, room: Signal, decides: Value, drawn: Value, found) -> None:
+        """The memories of triangles and of results, and the output."""
+        given, shown = self.i.payload, self.o.payload
+        members = corners_shape(self.grid, self.surface)
+        rest = {"material": given.material.shape(), **placement_of(self.surface)}
+        layout = data.StructLayout(members | rest)
+        triangle, bits = Signal(layout, name="triangle"), (WAITING_TRIANGLES - 1).bit_length()
+        m.submodules.triangles = triangles = Memory(shape=layout.size, depth=1 << bits, init=[])
+        m.submodules.results = results = Memory(shape=bits + found.shape().size, depth=_KEPT, init=[])
+        written, kept = triangles.write_port(), results.write_port()
+        head = results.read_port(domain="comb")
+        free, decided, oldest = (Signal(bits, name=name) for name in ("free", "decided", "oldest"))
+        behind, first, level = (Signal.like(kept.addr, name=name) for name in ("behind", "first", "level"))
+        slot, some = head.data[:bits], level != 0
+        m.d.comb += [
+            *copy_fields(triangle, given),
+            *(written.addr.eq(free), written.data.eq(triangle), written.en.eq(takes)),
+            *(kept.addr.eq(behind), kept.data.eq(Cat(decided, found)), kept.en.eq(decides & drawn)),
+            *(head.addr.eq(first), level.eq(behind - first)),
+        ]
+        # Levels are one cycle old.
+        m.d.sync += [
+            *(free.eq(free + takes), decided.eq(decided + decides), behind.eq(behind + kept.en)),
+            self._goes.eq(level < _KEPT - 2),
+            oldest.eq(Mux(some, slot, decided)),
+            room.eq((free - oldest)[:bits] < WAITING_TRIANGLES - _RESERVED),
+        ]
+
+        read, offered, reads = Signal(name="read"), Signal(name="offered"), Signal(name="reads")
+        wanted = ~offered | self.o.ready
+        word, steps = registered_read(m, triangles, slot, wanted, written)
+        # ``reads`` implies ``steps``, because the slot of a waiting triangle is not written.
+        m.d.comb += reads.eq(wanted & some)
+        coming, leaving = (
+            Signal(found.shape(), name=name, reset_less=True) for name in ("coming", "leaving")
+        )
+        middle = Signal(2, name="middle", reset_less=True)
+        with m.If(reads):
+            m.d.sync += first.eq(first + 1)
+        with m.If(steps):
             m.d.sync += [
-                valid.eq(~drops),
-                area.eq(Mux(positive, total, -total)),
-                right.eq(~positive),
-                flip.eq(back & (flips | culls)),
+                *(read.eq(reads), offered.eq(read)),
+                *(coming.eq(head.data[bits:]), leaving.eq(coming)),
+                # The exclusive or of the three indices is 3.
+                middle.eq(~(coming.first ^ coming.last)),
             ]
         with m.Elif(self.o.ready):
-            m.d.sync += valid.eq(0)
+            m.d.sync += offered.eq(0)
+        stored = data.View(layout, word)
         m.d.comb += [
-            self.o.valid.eq(valid),
-            *copy_fields(result, words, words.shape().members),
-            *(result.area.eq(area), result.right.eq(right), result.flip.eq(flip)),
+            self.o.valid.eq(offered),
+            *copy_fields(shown, stored, rest),
+            *copy_fields(shown, leaving, ("right", "flip", "area")),
         ]
-        return done & zero, done & culled & ~zero
-
-    @staticmethod
-    def _sorted(result, corners):
-        for k, corner in enumerate(corners):
-            for name in corner.shape().members:
-                yield copy(result[name][k], corner[name])
+        for name in members:
+            corners = [Value.cast(corner) for corner in stored[name]]
+            for k, index in enumerate((leaving.first, middle, leaving.last)):
+                chosen = Mux(index[1], corners[2], Mux(index[0], corners[1], corners[0]))
+                m.d.comb += Value.cast(shown[name][k]).eq(chosen)
 
 
-def _booth_digit(value: Value, bits: Value, negative: bool) -> tuple[Value, Value]:
-    """Value times a Booth digit (`booth_term`), negated if ``negative``; without a carry.
-
-    A negated multiple has inverted bits, so it is 1 too small. The second result tells where to add this 1.
-    """
-    low, middle, high = bits
-    one, two = low ^ middle, (low == middle) & (middle != high)
-    minus = ~high if negative else high
-    size = Mux(two, value << 1, Mux(one, value, 0))
-    return (size[:] ^ minus.replicate(len(size))).as_signed(), minus
-
-
-def _corner_shape(grid: Grid, surface: AttributeSpans | None) -> data.StructLayout:
-    members = corners_shape(grid, surface).items()
-    return data.StructLayout({name: shape.elem_shape for name, shape in members})
-
-
-def _largest_digits(grid: Grid) -> int:
-    """Digits of the largest height, with one bit for its sign."""
-    return -(-(grid.bits + 1) // DIGIT_BITS)
-
-
-def _rows_of(digits: int, grid: Grid) -> int:
-    """Least number of scanlines for which a height may need more than ``digits`` digits."""
-    return (1 << (DIGIT_BITS * digits - 1 - grid.subpixel_bits)) - 1
+def _ends(before: Sequence, values: Sequence) -> tuple[Value, Value]:
+    """The first and the last of three values. ``before`` has the comparisons of `PAIRS`."""
+    turn, same, other = before
+    return (
+        Mux(turn, Mux(same, values[2], values[1]), Mux(other, values[2], values[0])),
+        Mux(turn, Mux(other, values[0], values[2]), Mux(same, values[1], values[2])),
+    )

@@ -22,8 +22,8 @@ from blysk.golden.number.fixed import Fixed
 from blysk.golden.reference.scene import Scene
 from blysk.golden.render import Renderer
 from blysk.hdl.core.stream import connect
-from blysk.hdl.geometry.geometry import WAITING_TRIANGLES
 from blysk.hdl.geometry.triangles import counters_shape
+from blysk.hdl.geometry.vertex_sort import WAITING_TRIANGLES
 from blysk.hdl.render import STATUS, WAITING_SPANS, RendererUnit
 from blysk.sim.engines.engine import SimulationError
 from blysk.sim.engines.simulate import simulate
@@ -325,7 +325,7 @@ class TriangleSimulator:
         inside are consecutive drawn triangles.
         """
         geometry, frame, steps = self._render.geometry, sent.frame, self.renderer.geometry.grid.steps
-        drawn, _ = VertexSort(geometry.grid).compute(sent.triangles, frame)
+        drawn, _ = VertexSort(geometry.grid, geometry.model.tested).compute(sent.triangles, frame)
         triangles = drawn.triangles
         inside = _IN_UNITS + WAITING_SPANS + (0 if geometry.compact else WAITING_TRIANGLES)
         sides = []

@@ -75,9 +75,9 @@ COUNTED = [
 
 @pytest.fixture(autouse=True)
 def short_fifos(monkeypatch):
-    """FIFOs of geometry hold 5 words in place of 512, because each of their bits is a register of the
+    """Memories of geometry hold 5 or 8 words in place of 512, because each of their bits is a register of the
     proof."""
-    monkeypatch.setattr("blysk.hdl.geometry.geometry.WAITING_TRIANGLES", 5)
+    monkeypatch.setattr("blysk.hdl.geometry.vertex_sort.WAITING_TRIANGLES", 8)
     monkeypatch.setattr("blysk.hdl.geometry.geometry.BLOCK_WORDS", 5)
     monkeypatch.setattr("blysk.hdl.render.WAITING_SPANS", 5)
 

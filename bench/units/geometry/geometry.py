@@ -134,7 +134,7 @@ RECORD = Record(
     axis="",
     still={
         "fewer triangles wait than a block RAM has words": (
-            "waiting_triangles_level[9] waiting_walks_level[3-6] waiting_attributes_level[5-6] "
+            "waiting_walks_level[3-6] waiting_attributes_level[5-6] "
             "waiting_walks_room[0] waiting_attributes_room[0]"
         ),
         "a counter has room for more than a run has": "slivers[5-31] pieces_inside[5-9]",
