@@ -59,7 +59,8 @@ class _Design(click.ParamType):
     "designs",
     type=_Design(),
     multiple=True,
-    help=f"Compile only this method and model. Repeat for more.  [default: {len(DESIGNS)} designs]",
+    help="Compile only this method and model. Repeat for more. Only with quotient/blinn the page has meshes "
+    f"with colours and textures.  [default: {len(DESIGNS)} designs]",
 )
 @click.option(
     "--jobs",

@@ -35,8 +35,9 @@ from blysk.bench.web.web_data import (
     module_of,
     streams_of,
     tables,
+    texture_of,
 )
-from blysk.bench.web.web_designs import DESIGNS
+from blysk.bench.web.web_designs import COLORED, DESIGNS
 from blysk.bench.web.web_folder import MARK, PAGE, check_folder, earlier, report_files
 from blysk.golden.lighting.specular import MAX_EXPONENT
 from blysk.golden.presets import LOBES, MIRROR_LOBES, MODELS
@@ -68,6 +69,9 @@ def _answers(report: Path) -> list[dict[str, str]]:
 def tasks(designs: Sequence[tuple[str, str]], views: Mapping[str, int]) -> list[Task]:
     """Tasks of a site: its modules, then its spans.
 
+    If `COLORED` is among the designs, there is also its module with an albedo. Otherwise meshes that need an
+    albedo are left out.
+
     Parameters
     ----------
     designs : sequence of (method, model)
@@ -75,13 +79,17 @@ def tasks(designs: Sequence[tuple[str, str]], views: Mapping[str, int]) -> list[
     views : mapping
         Number of views by mesh.
     """
-    methods = list(dict.fromkeys(method for method, _ in designs))
-    found = [Task(module_of, {"method": method, "model": model}) for method, model in designs]
-    found += [
-        Task(streams_of, {"mesh": mesh, "view": view, "methods": methods})
-        for mesh, count in views.items()
-        for view in range(count)
-    ]
+    colored = [pair for pair in designs if pair == COLORED]
+    settings = [{"method": method, "model": model} for method, model in designs]
+    settings += [{"method": method, "model": model, "albedo": True} for method, model in colored]
+    found = [Task(module_of, of) for of in settings]
+    for mesh, count in views.items():
+        served = colored if MESHES[mesh].albedo else designs
+        methods = list(dict.fromkeys(method for method, _ in served))
+        found += [
+            Task(streams_of, {"mesh": mesh, "view": view, "methods": methods})
+            for view in range(count if methods else 0)
+        ]
     return found
 
 
@@ -135,6 +143,7 @@ def write_site(
             has_report=report is not None,
             answers=_answers(report) if report else [],
             modules=len(designs),
+            colored=any(mesh["albedo"] for mesh in meshes.values()),
         )
     )
     _write(folder, files, pictures)
@@ -146,9 +155,10 @@ def _scripts(tasks: Sequence[Task], results: Sequence[Any]) -> tuple[dict[str, s
     designs, meshes = {}, {}
     for task, result in zip(tasks, results, strict=True):
         if task.function is module_of:
-            name = "{method}-{model}".format(**task.settings)
+            settings = {"albedo": False} | task.settings
+            name = "{method}-{model}".format(**settings) + ("-albedo" if settings["albedo"] else "")
             files[f"modules/{name}.js"] = _script(name, result)
-            designs[name] = task.settings | {"bytes": result["bytes"]}
+            designs[name] = settings | {"bytes": result["bytes"]}
         else:
             mesh, view = task.settings["mesh"], task.settings["view"]
             names = [f"{mesh}-{view}-{number}" for number in range(len(result["data"]))]
@@ -157,8 +167,14 @@ def _scripts(tasks: Sequence[Task], results: Sequence[Any]) -> tuple[dict[str, s
                 for name, data in zip(names, result["data"], strict=True)
             }
             streams = {method: [names[k] for k in numbers] for method, numbers in result["streams"].items()}
-            entry = meshes.setdefault(mesh, {"title": MESHES[mesh].title, "views": []})
+            body = MESHES[mesh]
+            entry = meshes.setdefault(
+                mesh, {"title": body.title, "text": body.text, "albedo": body.albedo, "views": []}
+            )
             entry["views"].append({"axes": result["axes"], "streams": streams})
+    for mesh, entry in meshes.items():
+        if entry["albedo"]:
+            files[f"textures/{mesh}.js"] = _script(f"texture-{mesh}", texture_of(mesh))
     for model in dict.fromkeys([*(design["model"] for design in designs.values()), "blinn"]):
         files[f"models/{model}.js"] = _script(f"model-{model}", model_table(model))
     return files, designs, meshes

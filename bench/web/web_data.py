@@ -3,7 +3,7 @@
 import base64
 import inspect
 import zlib
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cache
 from typing import Any
@@ -11,19 +11,25 @@ from typing import Any
 import numpy as np
 
 from blysk.bench import accuracy
-from blysk.bench.surfaces import sphere
+from blysk.bench.surfaces import grid, sphere
+from blysk.bench.web.web_designs import ALBEDO, COLORED
 from blysk.golden.cosines.quotient_spans import MARGIN, QuotientSpans, SpanVectors
 from blysk.golden.frame_constants import (
+    EMISSION_ADDRESS,
     FIELDS_OF_A_FRAME,
     FIELDS_OF_A_LIGHT,
     LIGHT_STRIDE,
     LOBE_ADDRESS,
+    TEXEL_ADDRESS,
+    TEXELS_ADDRESS,
+    TEXTURE_ADDRESS,
     THRESHOLD_ADDRESS,
     FrameConstants,
 )
 from blysk.golden.frames.cut import cut_spans
 from blysk.golden.frames.local import line_ends
 from blysk.golden.frames.prepare import quantise_spans, spans_for, with_tables
+from blysk.golden.frames.surface import span_attributes, with_albedo
 from blysk.golden.frames.vector_axes import vector_axes
 from blysk.golden.lighting.intensity import Intensity
 from blysk.golden.lighting.specular import MAX_EXPONENT
@@ -42,7 +48,8 @@ from blysk.golden.reference.reflection import (
     PowerModel,
 )
 from blysk.golden.reference.scene import Scene
-from blysk.golden.reference.transfer import color_of_text
+from blysk.golden.reference.texture import Texture
+from blysk.golden.reference.transfer import color_of_text, decode
 from blysk.sim.engines.engine import StopReason
 from blysk.sim.engines.probes import ObservedPipeline, probes_of
 from blysk.sim.engines.wasm import build, format_of, ports_of
@@ -71,6 +78,7 @@ __all__ = [
     "spans_of",
     "streams_of",
     "tables",
+    "texture_of",
     "with_vectors",
 ]
 
@@ -150,12 +158,32 @@ class Body:
         Cameras of the turntable.
     margin : float
         See `Camera.framing`.
+    text : str
+        Line about its surface.
+    colored : bool
+        Whether its vertices have colours.
+    picture : callable, optional
+        Function that makes the picture of its texture: codes of sRGB, a uint8 array of shape (height, width,
+        3). The texture repeats the picture. It has levels, and the filter ``bilinear``.
     """
 
     title: str
     make: Callable[[], Mesh]
     views: int
     margin: float = 0.05
+    text: str = "a surface of one colour"
+    colored: bool = False
+    picture: Callable[[], np.ndarray] | None = None
+
+    @property
+    def albedo(self) -> bool:
+        """Whether only a module with an albedo draws it."""
+        return self.colored or self.picture is not None
+
+    @property
+    def texture(self) -> Texture | None:
+        """Its texture in linear light."""
+        return None if self.picture is None else Texture(decode(self.picture() / 255))
 
 
 def _square() -> Mesh:
@@ -164,17 +192,57 @@ def _square() -> Mesh:
     return Mesh(corners, np.array([(0, 1, 3), (0, 3, 2)]), normalise(corners * 0.3 + (0, 0, 1)))
 
 
+def _torus() -> Mesh:
+    """A torus of 1024 triangles: colours that change around it, and three squares of texture around it."""
+    across, around = np.meshgrid(np.linspace(0, 1, 17), np.linspace(0, 1, 33), indexing="ij")
+    tube, ring = 2 * np.pi * across, 2 * np.pi * around
+    normals = np.stack([np.cos(tube) * np.cos(ring), np.sin(tube), np.cos(tube) * np.sin(ring)], axis=-1)
+    circle = np.stack([np.cos(ring), np.zeros_like(ring), np.sin(ring)], axis=-1)
+    colors = (1 + np.cos(ring[..., np.newaxis] + np.arange(3) * 2 * np.pi / 3)) / 2
+    places = np.stack([3 * around, across], axis=-1)
+    mesh = grid(circle + 0.45 * normals, normalise(normals))
+    return replace(mesh, colors=colors.reshape(-1, 3), coordinates=places.reshape(-1, 2))
+
+
+def _tiles() -> np.ndarray:
+    """A picture of 64x64 texels: a checker of tiles of 8x8 texels, with dark joints."""
+    row, column = np.indices((64, 64))
+    picture = np.array([(38, 96, 120), (233, 196, 106)], dtype=np.uint8)[(row // 8 + column // 8) % 2]
+    picture[(row % 8 == 0) | (column % 8 == 0)] = 24
+    return picture
+
+
 MESHES = {
     "teapot": Body("Utah teapot", lambda: teapot(3000), 8),
     "sphere": Body("sphere", lambda: sphere(24), 1, 0.15),
     "square": Body("bent square", _square, 8, 0.1),
+    "colored": Body(
+        "torus, vertex colours",
+        lambda: replace(_torus(), coordinates=np.zeros((0, 2))),
+        1,
+        0.1,
+        "a colour at each vertex",
+        colored=True,
+    ),
+    "textured": Body(
+        "torus, texture",
+        lambda: replace(_torus(), colors=np.zeros((0, 3))),
+        1,
+        0.1,
+        "a texture of 64x64 texels with levels of detail, loaded again for each frame",
+        picture=_tiles,
+    ),
 }
 """Meshes of the page, by name."""
 
 
-def design_of(method: str, model: str) -> ShadingPipeline:
-    """The pipeline of a module: one light, sRGB, and a highlight gate if the method can have one."""
-    return preset(method, model, gate=METHODS[method].serves_gate, transfer="srgb")
+def design_of(method: str, model: str, albedo: bool = False) -> ShadingPipeline:
+    """The pipeline of a module: one light, sRGB, and a highlight gate if the method can have one.
+
+    With ``albedo`` it also has the path `ALBEDO`.
+    """
+    gate = METHODS[method].serves_gate
+    return preset(method, model, gate=gate, transfer="srgb", albedo=ALBEDO if albedo else None)
 
 
 @cache
@@ -210,6 +278,7 @@ def scene_of(settings: Mapping[str, Any]) -> Scene:
             (settings["specular"],) * 3,
             settings["exponent"],
             settings["roughness"],
+            texture=MESHES[settings["mesh"]].texture,
         ),
         lights=[Light(tuple(settings["direction"]), _channels(settings["light"]))],
         background=_channels(BACKGROUND),
@@ -227,8 +296,22 @@ COLUMNS = (
         for c in range(3)
     ),
     {"name": "ratio", "bytes": 3, "bias": 1 << 23},
+    *(
+        column
+        for line in ("attributes.start", "attributes.step")
+        for column in (
+            {"name": f"{line}.weight", "bytes": 3, "bias": 1 << 23},
+            *(
+                {"name": f"{line}.colors.{c}", "bytes": 4, "bias": 1 << 24, "from": f"{line}.weight"}
+                for c in range(3)
+            ),
+            *({"name": f"{line}.coordinates.{c}", "bytes": 3, "bias": 1 << 23} for c in range(2)),
+        )
+    ),
+    *({"name": f"attributes.{name}", "bytes": 1, "bias": 0} for name in ("exponent", "range", "level")),
+    *({"name": f"attributes.base.{c}", "bytes": 2, "bias": 1 << 15} for c in range(2)),
 )
-"""Columns of the spans in a file, one column for each field.
+"""Columns of the spans in a file, one column for each field. Spans without an albedo lack ``attributes``.
 
 A column has the codes of its field. With ``running`` it has their change from the previous span, with
 ``from`` their difference from another column. ``bias`` is added, so that no number is negative. A number
@@ -243,8 +326,9 @@ def encode(spans: Spans, visible: np.ndarray, ratio: np.ndarray | float = 1.0) -
 
     The bytes are, in this order:
 
-    - the number of spans and the number of fragments, 32 bits each;
-    - the `COLUMNS`: of each column the lowest byte of all codes, then the next byte of all codes;
+    - the numbers of spans, of fragments and of columns, 32 bits each;
+    - the first of the `COLUMNS`, in this number: of each column the lowest byte of all codes, then the next
+      byte of all codes;
     - a bit for each fragment. A byte is filled from its lowest bit on.
 
     Parameters
@@ -260,8 +344,11 @@ def encode(spans: Spans, visible: np.ndarray, ratio: np.ndarray | float = 1.0) -
     codes = {"x": spans.x, "y": spans.y, "length": spans.length, "ratio": np.rint(2**19 * logarithm)}
     for name, normal in (("left", spans.normal_left), ("right", spans.normal_right)):
         codes |= {f"normal_{name}.{c}": normal[:, c] for c in range(3)}
-    parts = [np.array([len(spans), len(visible)], dtype="<u4").tobytes()]
-    for column in COLUMNS:
+    if spans.attributes is not None:
+        codes |= _by_path("attributes", spans.attributes.beats)
+    columns = [column for column in COLUMNS if column["name"] in codes]
+    parts = [np.array([len(spans), len(visible), len(columns)], dtype="<u4").tobytes()]
+    for column in columns:
         values = np.asarray(codes[column["name"]], dtype=np.int64)
         if "from" in column:
             values = values - codes[column["from"]]
@@ -271,6 +358,17 @@ def encode(spans: Spans, visible: np.ndarray, ratio: np.ndarray | float = 1.0) -
         parts += [split[:, byte].tobytes() for byte in range(column["bytes"])]
     parts.append(np.packbits(visible, bitorder="little").tobytes())
     return zlib.compress(b"".join(parts), 9)
+
+
+def _by_path(path: str, beats: Any) -> Iterator[tuple[str, np.ndarray]]:
+    """Codes of nested beats, with names and indices with dots between them."""
+    if isinstance(beats, Mapping):
+        for name, inner in beats.items():
+            yield from _by_path(f"{path}.{name}", inner)
+    elif beats.ndim == 2:
+        yield from ((f"{path}.{index}", codes) for index, codes in enumerate(beats.T))
+    else:
+        yield path, beats
 
 
 def spans_of(mesh: str, view: int, exponent: int, design: ShadingPipeline) -> tuple[Raster, Spans]:
@@ -294,7 +392,10 @@ def spans_of(mesh: str, view: int, exponent: int, design: ShadingPipeline) -> tu
     if design.interpolator.brings_ends:
         return cut, spans_for(scene, cut, design)
     left, right = quantise_line(*line_ends(cut))
-    return cut, replace(quantise_spans(cut, scene.mesh.material), normal_left=left, normal_right=right)
+    spans = replace(quantise_spans(cut, scene.mesh.material), normal_left=left, normal_right=right)
+    if design.albedo is not None:
+        spans = replace(spans, attributes=span_attributes(scene, cut, design.albedo))
+    return cut, spans
 
 
 def with_vectors(spans: Spans, scene: Scene, design: ShadingPipeline) -> Spans:
@@ -336,7 +437,8 @@ def streams_of(mesh: str, view: int, methods: Sequence[str]) -> dict[str, Any]:
     found: list[str] = []
     streams: dict[str, list[int]] = {}
     for method in methods:
-        design = preset(method, accuracy.model_of(method), transfer="srgb")
+        albedo = ALBEDO if MESHES[mesh].albedo else None
+        design = preset(method, accuracy.model_of(method), transfer="srgb", albedo=albedo)
         streams[method] = []
         for exponent in BANDS:
             cut, spans = spans_of(mesh, view, exponent, design)
@@ -352,13 +454,13 @@ def streams_of(mesh: str, view: int, methods: Sequence[str]) -> dict[str, Any]:
     return {"axes": axes, "streams": streams, "data": found}
 
 
-def module_of(method: str, model: str) -> dict[str, Any]:
+def module_of(method: str, model: str, albedo: bool = False) -> dict[str, Any]:
     """The WebAssembly module of a pipeline, and the values needed to use it.
 
     Parameters
     ----------
-    method, model : str
-        Some of `METHODS` and `MODELS`.
+    method, model, albedo
+        As for `design_of`.
 
     Returns
     -------
@@ -371,7 +473,7 @@ def module_of(method: str, model: str) -> dict[str, Any]:
         - ``lobe``: see `lobe_of`;
         - ``vectors``: components of the vectors that spans bring, or ``None``.
     """
-    design = design_of(method, model)
+    design = design_of(method, model, albedo)
     component = ObservedPipeline(design)
     binary, ports, probes = build(component), ports_of(component), probes_of(component.unit)
     ages = {probe.name: probe.age for probe in probes}
@@ -393,6 +495,34 @@ def module_of(method: str, model: str) -> dict[str, Any]:
         "stages": [dict(zip(("name", "title", "from", "to"), stage, strict=True)) for stage in stages],
         "lobe": lobe_of(design),
         "vectors": None if design.interpolator.brings_ends else list(design.vector_spans.components),
+    }
+
+
+def texture_of(mesh: str) -> dict[str, Any]:
+    """The texture of a mesh with an albedo. A mesh without a texture gets a white texel.
+
+    Returns
+    -------
+    dict
+        - ``width`` and ``height`` of the picture;
+        - ``picture``: its codes of sRGB, row by row, red, green, blue;
+        - ``descriptor``: the two words of `TextureDescriptor`;
+        - ``halves``: values of `LoadedTextures.writes`, without the first, which is 0: each 18 bits in 3
+          bytes, the lowest first.
+
+        ``picture`` and ``halves`` are compressed by zlib, in base 64.
+    """
+    scene, design = scene_of(START | {"mesh": mesh}), design_of(*COLORED, albedo=True)
+    (constants,) = with_albedo([FrameConstants.of(scene)], scene, design)
+    picture = MESHES[mesh].picture
+    codes = np.full((1, 1, 3), 255, dtype=np.uint8) if picture is None else picture()
+    assert constants.texels is not None
+    assert constants.texture is not None
+    halves = constants.texels.writes()["value"][1:].astype("<u4").view(np.uint8).reshape(-1, 4)[:, :3]
+    packed = {"picture": codes, "halves": np.ascontiguousarray(halves)}
+    return {
+        **{"width": codes.shape[1], "height": codes.shape[0], "descriptor": constants.texture.words},
+        **{name: base64.b64encode(zlib.compress(of.tobytes(), 9)).decode() for name, of in packed.items()},
     }
 
 
@@ -464,6 +594,10 @@ def tables() -> dict[str, Any]:
         "stride": LIGHT_STRIDE,
         "lobe": LOBE_ADDRESS,
         "threshold": THRESHOLD_ADDRESS,
+        "emission": EMISSION_ADDRESS,
+        "texture": TEXTURE_ADDRESS,
+        "texels": TEXELS_ADDRESS,
+        "texel": TEXEL_ADDRESS,
         "done": int(StopReason.DONE),
         "vector": {
             "fraction": QuotientSpans.COMPONENT_FORMAT.fraction_bits,

@@ -1,9 +1,10 @@
 """Designs of the modules of the live page."""
 
 from blysk.bench import accuracy
+from blysk.golden.albedo.albedo import Albedo
 from blysk.golden.presets import METHODS
 
-__all__ = ["DESIGNS", "SERVED", "TABLES"]
+__all__ = ["ALBEDO", "COLORED", "DESIGNS", "SERVED", "TABLES"]
 
 TABLES = ("blinn", "ggx")
 """Models of N·H with a table that the page's script can make."""
@@ -20,3 +21,11 @@ DESIGNS = (
     *(("quotient", "ggx"), ("renormalise", "ggx"), ("linear", "blinn")),
 )
 """Method and model of each module. The rival has the model of the first module, too."""
+
+COLORED = ("quotient", "blinn")
+"""Method and model of the module with an albedo. A site with this design also has its module without an
+albedo."""
+
+ALBEDO = Albedo.of_parts(("colors", "bilinear"))
+"""Albedo path of this module. It serves vertex colours, textures, and both: where a mesh lacks colours or
+texture coordinates, these are white. The memory holds a texture of 64x64 texels and its levels."""

@@ -39,14 +39,17 @@ class Probe:
         Its shape. A fixed-point number has a `FixedShape`.
     age : int
         Cycles from the cycle in which the lights take a pixel's operands (``taken`` of `ObservedPipeline`) to
-        the cycle in which the word belongs to this pixel. Negative if the word comes first.
+        the cycle in which the word belongs to this pixel. Negative if the word comes first. If terms wait for
+        their albedo, words from the terms on are later. Until a pixel is held they keep their distance from
+        ``shaded``.
     exact : str
         Name of the exact quantity that the word approximates: ``normal_x``, ``normal_y``, ``normal_z``;
         ``cosine`` (N·L), ``highlight_cosine`` (N·H), ``one_minus_cosine`` (1 - N·H); ``product`` (the
         specular unit's slope k times 1 - N·H), ``base``, ``base_2``, ``base_4``, ``base_8`` (powers of the
-        base); ``diffuse``, ``specular``; ``red_diffuse``, ``red_specular``, ``red`` in LSB, not limited;
-        ``r``, ``g``, ``b`` in LSB, limited. Empty for flags, columns, the increments of a sum, and a place in
-        a lobe's table.
+        base); ``diffuse``, ``specular``; ``albedo`` of red; ``red_diffuse``, ``red_specular``,
+        ``red_surface`` (the light that the albedo multiplies), ``red`` in LSB, not limited; ``r``, ``g``,
+        ``b`` in LSB, limited. Empty for flags, columns, the increments of a sum, and a place in a lobe's
+        table.
     unit : float
         Value of the word that stands for 1 of the exact quantity.
     """
@@ -66,7 +69,7 @@ class ObservedPipeline(Component):
     Parameters
     ----------
     design : ShadingPipeline
-        Design of the pipeline, with one light. It may have a gate.
+        Design of the pipeline, with one light. It may have a gate, or an albedo with texels inside.
 
     Members
     -------
@@ -79,6 +82,8 @@ class ObservedPipeline(Component):
           without a gate;
         - ``waits``: whether a pixel of the interpolator is stalled;
         - ``taken``: whether the lights take a pixel;
+        - ``shaded``: whether the intensity unit takes the terms of a pixel, and its albedo;
+        - ``held``: whether a pixel of the intensity unit is stalled;
         - each word, by the name of its probe.
 
     Raises
@@ -94,7 +99,8 @@ class ObservedPipeline(Component):
         self.unit = ShadingPipelineUnit(design)
         members = dict(self.unit.signature.members)
         status = members.pop("status").shape.members
-        status |= {"gated_pixels": unsigned(_GATED_BITS), "waits": unsigned(1), "taken": unsigned(1)}
+        status |= {"gated_pixels": unsigned(_GATED_BITS), "waits": unsigned(1)}
+        status |= dict.fromkeys(("taken", "shaded", "held"), unsigned(1))
         status |= {probe.name: probe.shape for probe in probes_of(self.unit)}
         super().__init__(members | {"status": Out(data.StructLayout(status))})
 
@@ -116,10 +122,13 @@ class ObservedPipeline(Component):
             ]
         gated = Signal(_GATED_BITS)
         operands, taken = _unit(fragment, "interpolator").o, _unit(fragment, "light_0").i
+        shaded, held = (getattr(_unit(fragment, "intensity"), port) for port in "io")
         m.d.comb += [
             self.status.gated_pixels.eq(gated),
             self.status.waits.eq(operands.valid & ~operands.ready),
             self.status.taken.eq(taken.valid & taken.ready),
+            self.status.shaded.eq(shaded.valid & shaded.ready),
+            self.status.held.eq(held.valid & ~held.ready),
         ]
         if self.design.gate:
             m.d.sync += gated.eq(gated + (taken.valid & taken.ready & taken.payload.gated))
@@ -247,13 +256,10 @@ def _words(unit: ShadingPipelineUnit, fragment: Fragment) -> Iterator[tuple[Prob
 
     datapath, intensity = _part(fragment, "intensity.datapath"), _unit(fragment, "intensity")
     words, ages = _registers(datapath), _ages(datapath, intensity.i.payload)
-    product = Intensity.COLOR_FORMAT * Intensity.TERM_FORMAT
-    total = product + product
-    for name, own, title, format in (
-        ("red_diffuse", "diffuse_0_r", "red, diffuse", product),
-        ("red_specular", "specular_0_r", "red, specular", product),
-        ("red", "sum_1_0_r", "red, all light", total + total),
-    ):
+    if design.albedo is not None:
+        red = intensity.i.payload.albedo[0]
+        yield number("albedo", "albedo, red", "intensity", red, light.latency, "albedo")
+    for name, own, title, format in _sums_of_red(design):
         age = light.latency + ages[own]
         yield number(name, title, "intensity", words[own], age, name, format=format)
     ends = (
@@ -269,6 +275,21 @@ def _words(unit: ShadingPipelineUnit, fragment: Fragment) -> Iterator[tuple[Prob
     for name, title in (("x", "column"), ("last", "last of its span")):
         value = pixel[name]
         yield Probe(name, title, "output", Shape.cast(value.shape()), age, ""), value
+
+
+def _sums_of_red(design: ShadingPipeline) -> Iterator[tuple[str, str, str, Format]]:
+    """Words of red in the intensity unit: name, name of its register, title, format."""
+    product = Intensity.COLOR_FORMAT * Intensity.TERM_FORMAT
+    yield "red_diffuse", "diffuse_0_r", "red, diffuse", product
+    yield "red_specular", "specular_0_r", "red, specular", product
+    if design.albedo is None:
+        total = product + product
+        yield "red", "sum_1_0_r", "red, all light", total + total
+    else:
+        surface = Intensity.SURFACE_FORMAT
+        total = surface * Intensity.ALBEDO_FORMAT + (product + Intensity.COLOR_FORMAT)
+        yield "red_surface", "surface_r", "red, light on the surface", surface
+        yield "red", "sum_r", "red, all light", total
 
 
 def _accumulators(fragment, number, one: float):

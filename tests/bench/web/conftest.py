@@ -10,7 +10,7 @@ from .live_page import DESIGNS, VIEWS, WIDTHS
 
 @pytest.fixture(scope="session")
 def live_site(tmp_path_factory):
-    """A site of three modules and three views."""
+    """A site of seven modules and five views."""
     folder = tmp_path_factory.mktemp("web") / "site"
     work = web.tasks(DESIGNS, VIEWS)
     web.write_site(folder, work, results_of(work))

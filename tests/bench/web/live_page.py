@@ -25,7 +25,10 @@ WIDTHS = {"desktop": (1280, 800), "phone": (375, 740)}
 DESIGNS = [("quotient", "blinn"), ("quotient", "phong"), ("quadratic", "cosquad"), ("renormalise", "exp")]
 DESIGNS += [("linear", "cosquad"), ("renormalise", "ggx")]
 
-VIEWS = {"teapot": 2, "square": 1}
+VIEWS = {"teapot": 2, "square": 1, "colored": 1, "textured": 1}
+
+MODULES = [*map("-".join, DESIGNS), "quotient-blinn-albedo"]
+"""Modules of the site."""
 
 
 def settle(page):
@@ -80,7 +83,8 @@ def digest(image):
 
 def prepared(state):
     """Scene, design and spans of the page's settings."""
-    design = web_data.design_of(state["method"], state["model"])
+    albedo = web_data.MESHES[state["mesh"]].albedo
+    design = web_data.design_of(state["method"], state["model"], albedo)
     exponent = web_data.BANDS[-1] if state["model"] == "ggx" else state["exponent"]
     band = next(most for most in web_data.BANDS if exponent <= most)
     cut, spans = web_data.spans_of(state["mesh"], state["view"], band, design)
@@ -95,7 +99,8 @@ UNITS = {}
 def natively(state):
     """Frame and run of the native engine."""
     scene, design, frame = prepared(state)
-    unit = UNITS.setdefault((design.method, design.model), ObservedPipeline(design))
+    key = design.method, design.model, design.albedo is None
+    unit = UNITS.setdefault(key, ObservedPipeline(design))
     run = simulate(
         unit,
         beats_of(unit.unit, frame.spans),

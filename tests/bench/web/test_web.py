@@ -19,8 +19,10 @@ from blysk.golden.frame_constants import FrameConstants
 from blysk.golden.frames.prepare import prepare
 from blysk.golden.pipeline import Spans
 from blysk.golden.presets import METHODS, MODELS, preset
+from blysk.hdl.albedo.attribute_spans import span_attributes_shape
 from blysk.hdl.pipeline import ShadingPipelineUnit
 from blysk.sim.engines.probes import probes_of
+from blysk.sim.engines.wasm import fields_of
 from blysk.sim.errors import InputError
 from blysk.sim.installation import install_extra
 
@@ -34,9 +36,9 @@ DESIGNS = [("quotient", "blinn"), ("quadratic", "cosquad"), ("linear", "exp")]
 def unpacked(data):
     """Codes by column, and which fragments show, found as the page finds them, from the data of the page."""
     raw = zlib.decompress(data)
-    count, fragments = np.frombuffer(raw[:8], "<u4").tolist()
-    at, codes = 8, {}
-    for column in json.loads(json.dumps(web_data.COLUMNS)):
+    count, fragments, columns = np.frombuffer(raw[:12], "<u4").tolist()
+    at, codes = 12, {}
+    for column in json.loads(json.dumps(web_data.COLUMNS))[:columns]:
         values = np.zeros(count, dtype=np.int64)
         for byte in range(column["bytes"]):
             values += np.frombuffer(raw, np.uint8, count, at).astype(np.int64) << 8 * byte
@@ -54,8 +56,10 @@ def unpacked(data):
 
 @pytest.mark.parametrize("mesh", web_data.MESHES)
 def test_spans_as_they_are_sent(mesh):
-    scene = web_data.scene_of(web_data.START | {"mesh": mesh, "view": web_data.MESHES[mesh].views - 1})
-    frame = prepare(scene, preset("quadratic", "cosquad"))
+    body = web_data.MESHES[mesh]
+    scene = web_data.scene_of(web_data.START | {"mesh": mesh, "view": body.views - 1})
+    design = web_data.design_of("quotient", "blinn", True) if body.albedo else preset("quadratic", "cosquad")
+    frame = prepare(scene, design)
     ratio = frame.cut_raster.magnitude_right / frame.cut_raster.magnitude_left
     codes, visible = unpacked(web_data.encode(frame.spans, frame.cut_raster.visible, ratio))
     np.testing.assert_allclose(2 ** (codes["ratio"] / 2**19), ratio, rtol=2**-19)
@@ -67,6 +71,17 @@ def test_spans_as_they_are_sent(mesh):
             np.testing.assert_array_equal(codes[f"normal_{place}.{c}"], normal[:, c])
     np.testing.assert_array_equal(visible, frame.cut_raster.visible)
     assert visible.sum() > 1000
+    # The names are those of the fields of the hardware.
+    layout = span_attributes_shape(design.albedo.spans) if body.albedo else None
+    names = {f"attributes.{name}" for name in fields_of(layout)} if body.albedo else set()
+    assert {name for name in codes if name.startswith("attributes")} == names
+    for name in names:
+        _, *path, last = name.split(".")
+        found = frame.spans.attributes.beats
+        for key in path:
+            found = found[key]
+        found = found[:, int(last)] if last.isdigit() else found[last]
+        np.testing.assert_array_equal(codes[name], found, err_msg=name)
 
 
 def test_extreme_codes_are_kept():
@@ -133,8 +148,8 @@ def probes():
     """Probes of all modules of the page."""
     return [
         probe
-        for pair in web_designs.DESIGNS
-        for probe in probes_of(ShadingPipelineUnit(web_data.design_of(*pair)))
+        for design in (*web_designs.DESIGNS, (*web_designs.COLORED, True))
+        for probe in probes_of(ShadingPipelineUnit(web_data.design_of(*design)))
     ]
 
 
@@ -190,7 +205,7 @@ def test_every_block_has_a_stage(script, probes, monkeypatch):
 
 @pytest.fixture(scope="module")
 def work():
-    return web.tasks(DESIGNS, {"teapot": 1, "square": 2})
+    return web.tasks(DESIGNS, {"teapot": 1, "square": 2, "textured": 1})
 
 
 @pytest.fixture(scope="module")
@@ -208,25 +223,34 @@ def site(tmp_path, work, results):
     return folder
 
 
+def test_meshes_with_an_albedo_need_its_module():
+    views = {"teapot": 1, "colored": 1, "textured": 1}
+    assert [task.settings.get("mesh") for task in web.tasks(DESIGNS[1:], views)] == [None, None, "teapot"]
+    served = web.tasks(DESIGNS, views)[-2:]
+    assert [task.settings["methods"] for task in served] == [["quotient"], ["quotient"]]
+    assert [name for name, body in web_data.MESHES.items() if body.albedo] == ["colored", "textured"]
+
+
 def test_files_of_the_site(site):
     mark = json.loads((site / "site.json").read_text())
     there = sorted(path.relative_to(site).as_posix() for path in site.rglob("*") if path.is_file())
     assert there == sorted([*mark["files"], "site.json"])
-    assert {"index.html", "modules/quadratic-cosquad.js", "models/blinn.js", "spans/square-1-1.js"} <= set(
-        there
-    )
+    some = {"index.html", "modules/quadratic-cosquad.js", "models/blinn.js", "spans/square-1-1.js"}
+    assert some | {"modules/quotient-blinn-albedo.js", "textures/textured.js"} <= set(there)
     page = Reader((site / "index.html").read_text())
     assert len(page.ids) == len(set(page.ids))
     text = " ".join((site / "index.html").read_text().split())
     *lower, highest = web_data.BANDS
     assert f"cut for the exponent {', '.join(map(str, lower))} or {highest}, the smallest" in text
     data = json.loads(page.texts["site"])
-    assert list(data["designs"]) == ["quotient-blinn", "quadratic-cosquad", "linear-exp"]
-    bare = all(web_data.design_of(d["method"], d["model"]).albedo is None for d in data["designs"].values())
-    assert bare == ("this page leaves out vertex colours, textures and alpha" in text)
+    plain = ["quotient-blinn", "quadratic-cosquad", "linear-exp"]
+    assert list(data["designs"]) == [*plain, "quotient-blinn-albedo"]
+    assert [name for name, design in data["designs"].items() if design["albedo"]] == ["quotient-blinn-albedo"]
+    assert "this page leaves out alpha, emission, metals, unlit surfaces and the filter nearest" in text
     assert data["start"] == web_data.START
     assert data["mirrored"] == ["phong"]
-    assert [len(mesh["views"]) for mesh in data["meshes"].values()] == [1, 2]
+    assert [len(mesh["views"]) for mesh in data["meshes"].values()] == [1, 2, 1]
+    assert [mesh["albedo"] for mesh in data["meshes"].values()] == [False, False, True]
     for mesh in data["meshes"].values():
         for view in mesh["views"]:
             for names in view["streams"].values():
@@ -246,8 +270,11 @@ def test_nothing_is_remote(site):
 
 def test_an_earlier_site_is_replaced(site, work, results):
     page = (site / "index.html").read_text()
-    web.write_site(site, work[1:2] + work[3:4], results[1:2] + results[3:4])
-    assert (site / "index.html").read_text() != page
+    web.write_site(site, work[1:2] + work[4:5], results[1:2] + results[4:5])
+    text = (site / "index.html").read_text()
+    assert text != page
+    assert "this page leaves out vertex colours, textures, alpha, emission" in " ".join(text.split())
+    assert not (site / "textures" / "textured.js").exists()
     assert not (site / "modules" / "linear-exp.js").exists()
     assert not (site / "spans" / "square-0-0.js").exists()
     mark = json.loads((site / "site.json").read_text())
@@ -393,7 +420,8 @@ def test_command(tmp_path, monkeypatch, work, results, plain_section):
     assert list(report["sections"]) == ["plain"]
     assert found.output.split() == ["site", str(tmp_path / "site" / "index.html")]
     modules = [task.settings for task in asked if task.function is web_data.module_of]
-    assert modules == [{"method": method, "model": model} for method, model in DESIGNS]
+    plain = [{"method": method, "model": model} for method, model in DESIGNS]
+    assert modules == [*plain, plain[0] | {"albedo": True}]
     assert len(asked) - len(modules) == sum(body.views for body in web_data.MESHES.values())
 
 

@@ -19,6 +19,7 @@ from blysk.sim.engines.probes import ObservedPipeline
 
 from .live_page import (
     DESIGNS,
+    MODULES,
     by_model,
     change,
     digest,
@@ -83,7 +84,7 @@ def test_a_gate_is_counted(open_page):
 def test_every_module_gives_the_frame_of_the_native_engine(open_page):
     """Designs of six kinds, in both engines. The units' tests compile the other methods."""
     page = open_page()
-    assert page.evaluate("() => Object.keys(blysk.site.designs)") == ["-".join(pair) for pair in DESIGNS]
+    assert page.evaluate("() => Object.keys(blysk.site.designs)") == MODULES
     digests = set()
     for method, model in DESIGNS:
         use(page, method, model)
@@ -207,6 +208,59 @@ def test_constants_are_those_of_python(open_page):
     assert not np.any(found[-1]["constants"]["halfway"])
 
 
+@pytest.mark.skipif(not has_compiler(), reason="no C++ compiler: pysim would take hours")
+@pytest.mark.parametrize("mesh", ["colored", "textured"])
+def test_colours_and_textures(open_page, mesh):
+    """Pixels and cycles are those of the native engine. The page takes the module that draws the mesh."""
+    page = open_page()
+    use(page, "linear", "cosquad")
+    change(page, "mesh", mesh)
+    state = state_of(page)
+    assert (state["method"], state["model"], state["color"]) == ("quotient", "blinn", "#ffffff")
+    assert page.locator("#mesh-text").inner_text() == web_data.MESHES[mesh].text
+    for box, option in (("method", "linear"), ("model", "cosquad"), ("compare", "rival")):
+        assert page.locator(f"#{box} option[value={option}]").is_disabled()
+    image, run = natively(state)
+    assert len(np.unique(image.reshape(-1, 3), axis=0)) > 1000
+    assert digest(picture_of(page)) == digest(image) == digest(by_model(state))
+    assert figure(page, "cycles") == run.total_cycles
+    golden, mask = exact_of(state, "method")
+    figures = error_figures(picture_of(page), golden * 255, mask)
+    # The page finds the albedo from the words of the spans.
+    assert figure(page, "largest") == pytest.approx(figures.max_lsb, abs=0.01)
+    assert figure(page, "p999") == pytest.approx(figures.p999_lsb, abs=0.01)
+    assert 0.5 < figure(page, "largest") < 0.7
+    page.evaluate("d => { blysk.state.direction = d; return blysk.refresh(); }", [0.9, 0.3, 0.4])
+    change(page, "color", "#88ccff")
+    assert digest(picture_of(page)) == digest(by_model(state_of(page))) != digest(image)
+    change(page, "mesh", "square")
+    state = state_of(page)
+    assert state["color"] == web_data.START["color"]
+    assert page.locator("#method option[value=linear]").is_enabled()
+    assert digest(picture_of(page)) == digest(by_model(state))
+
+
+def exact_of(state, reference):
+    """The page's reference by golden, encoded, and the pixels with a surface."""
+    scene, design, frame = prepared(state)
+    entry = web_data.REFERENCES[reference]
+    raster = dataclasses.replace(
+        frame.cut_raster,
+        normal_left=frame.spans.normal_left / ONE,
+        normal_right=frame.spans.normal_right / ONE,
+    )
+    if design.interpolator.curve_is_exact:
+        # The codes have the lengths of the true line.
+        ones = np.ones(len(frame.spans))
+        raster = dataclasses.replace(raster, magnitude_left=ones, magnitude_right=ones)
+    reflection = REFLECTION_MODELS[(state["model"] != "phong" and entry["model"]) or state["model"]]
+    if entry["curve"] == "exact":
+        golden = encode(render(scene, "phong", reflection, raster=raster).image)
+    else:
+        golden = encode(shade_spans(scene, raster, design.interpolator.exact_normals, reflection))
+    return golden, visible_mask(scene, raster)
+
+
 @pytest.mark.parametrize("reference", web_data.REFERENCES)
 def test_reference_is_that_of_golden(open_page, reference):
     page = open_page()
@@ -221,24 +275,7 @@ def test_reference_is_that_of_golden(open_page, reference):
         change(page, "model", model)
         change(page, "exponent", exponent)
         change(page, "reference", reference)
-        state = state_of(page)
-        scene, design, frame = prepared(state)
-        entry = web_data.REFERENCES[reference]
-        raster = dataclasses.replace(
-            frame.cut_raster,
-            normal_left=frame.spans.normal_left / ONE,
-            normal_right=frame.spans.normal_right / ONE,
-        )
-        if design.interpolator.curve_is_exact:
-            # The codes have the lengths of the true line.
-            ones = np.ones(len(frame.spans))
-            raster = dataclasses.replace(raster, magnitude_left=ones, magnitude_right=ones)
-        reflection = REFLECTION_MODELS[(model != "phong" and entry["model"]) or model]
-        if entry["curve"] == "exact":
-            golden = encode(render(scene, "phong", reflection, raster=raster).image)
-        else:
-            golden = encode(shade_spans(scene, raster, design.interpolator.exact_normals, reflection))
-        mask = visible_mask(scene, raster)
+        golden, mask = exact_of(state_of(page), reference)
         figures = error_figures(picture_of(page), golden * 255, mask)
         # The lengths of exact normals are sent with 19 bits of their logarithm.
         assert figure(page, "largest") == pytest.approx(figures.max_lsb, abs=2e-4)

@@ -1,19 +1,26 @@
 """The arithmetic of the live page's script, without a browser, equals that of Python to the bit."""
 
+import base64
 import json
 import shutil
 import subprocess
+import zlib
 from importlib import resources
 
 import numpy as np
 import pytest
 
 from blysk.bench.web import web_data
+from blysk.golden.frame_constants import writes_of
 from blysk.golden.frames.prepare import constants_of
+from blysk.golden.reference.albedo import fragment_albedo
 from blysk.golden.reference.geometry import normalise
 from blysk.golden.reference.lighting import intensity
 from blysk.golden.reference.reflection import REFLECTION_MODELS
 from blysk.golden.reference.transfer import color_of_text, encode
+from blysk.hdl.frame_constants import write_shape
+from blysk.sim.engines.beats import pack, word_count
+from blysk.sim.engines.wasm import fields_of
 
 
 def by_script(call, **given):
@@ -126,3 +133,56 @@ def test_phong_in_float64_is_that_of_golden():
         exact = intensity(normals, *given)
         np.testing.assert_allclose(limited, 255 * encode(exact).ravel(), atol=1e-9)
         np.testing.assert_allclose(whole, exact.ravel(), atol=1e-12)
+
+
+def unpacked(text):
+    return list(zlib.decompress(base64.b64decode(text)))
+
+
+@needs_node
+@pytest.mark.ci
+@pytest.mark.long
+@pytest.mark.parametrize("mesh", ["colored", "textured"])
+def test_albedo_and_texels_are_those_of_python(mesh, monkeypatch):
+    """The albedo of fragments as near as the words of their spans, and all words of the write port."""
+    monkeypatch.setattr(web_data, "MAX_EXPONENT", 50)
+    design = web_data.design_of(*web_data.COLORED, albedo=True)
+    state = web_data.START | {"mesh": mesh, "color": "#ffffff"}
+    scene = web_data.scene_of(state)
+    cut, spans = web_data.spans_of(mesh, 0, 100, design)
+    chosen = np.arange(0, len(spans), 8)
+    some, fragments = spans[chosen], np.isin(cut.span, chosen)
+    texture, shape = web_data.texture_of(mesh), write_shape()
+    found, words = by_script(
+        """(() => {
+            const texture = core.textureOf(given, picture, halves);
+            const spans = core.spansOf(Uint8Array.from(bytes), columns);
+            const constants = core.constantsOf(settings, viewer, tables, lobe, components, texture);
+            const {words} = core.writesOf(constants, tables, port);
+            return [[...core.albedosOf(spans, texture)], [...words]];
+        })()""",
+        given={name: texture[name] for name in ("width", "height", "descriptor")},
+        picture=unpacked(texture["picture"]),
+        halves=unpacked(texture["halves"]),
+        bytes=list(zlib.decompress(web_data.encode(some, cut.visible[fragments]))),
+        columns=web_data.COLUMNS,
+        settings={**state, "color": [1, 1, 1], "light": [1, 1, 1]},
+        viewer=scene.camera.viewer.tolist(),
+        tables=web_data.tables(),
+        lobe=web_data.lobe_of(design),
+        components=list(design.vector_spans.components),
+        port={"words": word_count(shape), "fields": fields_of(shape)},
+    )
+    np.testing.assert_array_equal(words, pack(shape, writes_of(constants_of(scene, design)))[:, 0])
+    exact = fragment_albedo(scene, cut, fragments & cut.visible)
+    # Lines are off by the errors of their words. Colours differ by at most 1 from texel to texel.
+    model = design.albedo.spans
+    bound = 2 * model.errors(some.attributes, some.length)
+    bound /= model.compute(some.attributes, some.length).weight.values
+    if mesh == "textured":
+        bound *= np.repeat(2.0 ** (1 + some.attributes.range), some.length)
+        assert len(np.unique(some.attributes.level)) > 1
+    bound = bound[cut.visible[fragments], np.newaxis] + 1e-12
+    assert bound.max() < 2**-14
+    assert (np.abs(np.reshape(found, (-1, 3)) - exact) <= bound).all()
+    assert np.ptp(exact) > 0.5

@@ -6,6 +6,8 @@ import pytest
 from amaranth.hdl import Fragment, Value
 from amaranth.sim import Simulator
 
+from blysk.golden.albedo.albedo import Albedo
+from blysk.golden.cosines.quotient_spans import SpanVectors
 from blysk.golden.frame_constants import FrameConstants, writes_of
 from blysk.golden.lighting.specular import Specular
 from blysk.golden.normals.difference_accumulator import DifferenceAccumulator
@@ -19,7 +21,7 @@ from blysk.hdl.pipeline import ShadingPipelineUnit
 from blysk.sim.engines.beats import pack, unpack, word_count
 from blysk.sim.engines.probes import ObservedPipeline, probes_of
 from blysk.sim.engines.simulate import simulate
-from blysk.sim.frames.frame import beats_of
+from blysk.sim.frames.frame import beats_of, sample_attributes, sample_constants
 
 DESIGN = preset("quadratic", "cosquad", operand="one_minus_cosine", gate=True)
 
@@ -174,3 +176,42 @@ def test_words_are_those_of_the_model(observed):
         assert code("red_specular") == code("specular") * constants.specular[0, 0]
         assert code("red") == code("red_diffuse") + code("red_specular") + (constants.ambient[0] << 17)
     assert 3 <= followed < count
+
+
+@pytest.mark.ci
+@pytest.mark.long
+def test_words_of_an_albedo_are_those_of_the_model():
+    """If terms wait for their albedo, words behind them keep their distance from ``shaded``."""
+    design = preset("quotient", "blinn", albedo=Albedo.of_parts(("colors",)), transfer="srgb")
+    component = ObservedPipeline(design)
+    rng = np.random.default_rng(6)
+    length = np.array([5, 1, 9, 3, 4])
+    ends = rng.normal(size=(2, len(length), len(design.vector_spans.components)))
+    normals = np.zeros((len(length), 3), dtype=np.int64)
+    spans = Spans(
+        *(10 * np.arange(5), np.arange(5), length, normals, normals),
+        vectors=SpanVectors.quantise(*ends, length),
+        attributes=sample_attributes(design.albedo, length, rng),
+    )
+    (constants,) = sample_constants(design, rng)
+    rows = rows_of(component, spans, constants, len(constants.writes()["data"]) + 150)
+    taken, shaded = (np.flatnonzero(rows[name]) for name in ("taken", "shaded"))
+    assert len(taken) == len(shaded) == length.sum()
+    ages = {probe.name: probe.age for probe in probes_of(component.unit)}
+    assert (shaded - taken >= ages["diffuse"]).all()
+    # Pixels that are held before their last word here. A span of one pixel makes its successor wait.
+    last = ages["red"] - ages["diffuse"]
+    free = np.flatnonzero([not rows["held"][clock : clock + last].any() for clock in shaded])
+    assert 5 < len(free) < len(shaded)
+    shaded = shaded[free]
+    word = {name: rows[name][shaded + age - ages["diffuse"]] for name, age in ages.items() if age > 0}
+    albedo = design.albedo.compute(spans.attributes, length, spans.material).codes[free, 0]
+    np.testing.assert_array_equal(word["albedo"], albedo)
+    light = word["diffuse"].astype(np.int64) * constants.diffuse[0, 0]
+    np.testing.assert_array_equal(word["red_diffuse"], light)
+    surface = light + (constants.ambient[0] << 17) + (1 << 16) >> 17
+    np.testing.assert_array_equal(word["red_surface"], surface)
+    shine = word["specular"].astype(np.int64) * constants.specular[0, 0]
+    total = (surface * albedo << 1) + shine + (int(constants.emission[0]) << 17)
+    np.testing.assert_array_equal(word["red"], total)
+    assert (surface > 0).any()

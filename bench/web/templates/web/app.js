@@ -108,11 +108,26 @@ const blysk = (() => {
       return spans;
     });
 
+  // The texture of a mesh; `null` for the name `null`.
+  const textureOf = (name) =>
+    once(`texture ${name}`, async () => {
+      if (name === null) return null;
+      const { picture, halves, ...rest } = await wanted(`texture-${name}`, `textures/${name}.js`);
+      const texture = core.textureOf(rest, ...(await Promise.all([picture, halves].map(core.unpacked))));
+      await ask("texture", { name, texture });
+      return texture;
+    });
+
   const modelOf = (name) => once(`model ${name}`, () => wanted(`model-${name}`, `models/${name}.js`));
 
   // A frame.
 
   const view = () => site.meshes[state.mesh].views[state.view];
+
+  // Whether the mesh needs a module with an albedo, and the name of the module of a method and a model for this mesh.
+  const colored = () => site.meshes[state.mesh].albedo;
+  const moduleOf = (method, model) => `${method}-${model}${colored() ? "-albedo" : ""}`;
+  const modules = () => Object.values(site.designs).filter(({ albedo }) => albedo === colored());
 
   function settingsNow(name = state.method, reflection = state.model) {
     const reference = site.references[state.reference];
@@ -123,8 +138,9 @@ const blysk = (() => {
     const { direction, exponent, roughness, ambient, diffuse, specular } = state;
     return {
       ...{ direction, exponent, roughness, ambient, diffuse, specular },
-      design: `${name}-${reflection}`,
+      design: moduleOf(name, reflection),
       spans: view().streams[name][band],
+      texture: colored() ? state.mesh : null,
       viewer: view().axes[2],
       color: hexChannels(state.color).map(core.linear),
       light: hexChannels(state.light).map(core.linear),
@@ -138,7 +154,7 @@ const blysk = (() => {
 
   // Settings of the rival, which is drawn right of the divider; `null` if the exact frame is drawn there.
   function rivalNow() {
-    if (state.compare !== "rival" || !site.rival || state.method === site.rival) return null;
+    if (state.compare !== "rival" || !site.rival || state.method === site.rival || colored()) return null;
     const model = `${site.rival}-${state.model}` in site.designs ? state.model : site.rivalModel;
     return settingsNow(site.rival, model);
   }
@@ -159,6 +175,7 @@ const blysk = (() => {
         const rival = rivalNow();
         const [model] = await Promise.all([
           modelOf(settings.reference.model),
+          textureOf(settings.texture),
           ...[settings, rival].filter(Boolean).flatMap((of) => [designOf(of.design), spansOf(of.spans)]),
         ]);
         if (again) continue;
@@ -401,12 +418,15 @@ const blysk = (() => {
     const views = site.meshes[state.mesh].views.length;
     byId("view-number").max = views - 1;
     byId("view-number").parentNode.hidden = views < 2;
-    for (const option of byId("model").options) option.disabled = !(`${state.method}-${option.value}` in site.designs);
+    for (const option of byId("method").options) option.disabled = !modules().some(({ method }) => method === option.value);
+    for (const option of byId("model").options) option.disabled = !(moduleOf(state.method, option.value) in site.designs);
     for (const output of byId("controls").querySelectorAll("output")) {
       const value = byId(output.htmlFor.value).value;
       output.textContent = output.htmlFor.value === "view-number" ? `${Number(value) + 1} of ${views}` : value;
     }
     const { text } = site.references[state.reference];
+    for (const option of byId("compare").options) option.disabled = option.value === "rival" && colored();
+    byId("mesh-text").textContent = site.meshes[state.mesh].text;
     byId("method-text").textContent = site.methods[state.method].text.replaceAll("`", "");
     byId("compare-text").textContent = COMPARED[rivalNow() ? "rival" : "exact"];
     byId("explained").replaceChildren(
@@ -433,10 +453,15 @@ const blysk = (() => {
 
   byId("controls").addEventListener("input", ({ target }) => {
     const number = target.type === "range" ? Number(target.value) : target.value;
+    const before = colored();
     state[target.id === "view-number" ? "view" : target.id] = number;
     if (target.id === "mesh") state.view = 0;
-    if (!(`${state.method}-${state.model}` in site.designs))
-      state.model = Object.values(site.designs).find(({ method }) => method === state.method).model;
+    // The colour of the surface multiplies the albedo, so a surface with an albedo is white at first.
+    if (before !== colored()) Object.assign(state, { color: before ? site.start.color : "#ffffff", compare: "exact" });
+    if (!(moduleOf(state.method, state.model) in site.designs)) {
+      const { method, model } = modules().find((of) => of.method === state.method) ?? modules()[0];
+      Object.assign(state, { method, model });
+    }
     changed();
   });
   byId("controls").addEventListener("submit", (event) => event.preventDefault());
@@ -454,10 +479,11 @@ const blysk = (() => {
   async function look(x, y) {
     setOrbit(false);
     const settings = settingsNow();
-    const [design, spans, model] = await Promise.all([
+    const [design, spans, model, texture] = await Promise.all([
       designOf(settings.design),
       spansOf(settings.spans),
       modelOf(state.model),
+      textureOf(settings.texture),
     ]);
     const { codes, first, visible } = spans;
     let span = -1;
@@ -479,13 +505,21 @@ const blysk = (() => {
     const [from, to] = [Math.max(span - 2, 0), Math.min(span + 2, spans.count)];
     const trace = await ask("trace", { settings, from, to });
     const own = { ...settings.reference, ...site.methods[state.method] };
-    const inside = { x, y, design, spans, span, from, to, trace, settings, model, curve: own.curve, chord: own.chord };
+    const inside = { x, y, design, spans, span, from, to, trace, settings, model, texture };
+    Object.assign(inside, { curve: own.curve, chord: own.chord });
     inside.start = first[span] - first[from];
     inside.length = codes.length[span];
     const status = design.ports.status.fields;
     inside.code = (name, clock) => core.get(trace.rows, (clock - 1) * trace.size, status[name]);
-    inside.taken = new Map();
-    for (let clock = 1, n = 0; clock <= trace.count; clock++) if (inside.code("taken", clock)) inside.taken.set(clock, n++);
+    // The pixels that the lights take, and those that the intensity unit takes, by the cycles.
+    [inside.taken, inside.shaded] = ["taken", "shaded"].map((name) => {
+      const found = new Map();
+      for (let clock = 1; clock <= trace.count; clock++) if (inside.code(name, clock)) found.set(clock, found.size);
+      return found;
+    });
+    inside.given = new Map(trace.cycles.map((clock, n) => [clock, n]));
+    // Ages of a pixel when the intensity unit takes it, and when it comes out.
+    [inside.lit, inside.done] = [design.stages[1].to, design.stages[3].to];
     inside.firstClock = trace.inputClocks[span - from];
     inside.lastClock = trace.cycles[inside.start + inside.length - 1];
     inside.exact = exactValues(inside);
@@ -508,17 +542,19 @@ const blysk = (() => {
     drawPipeline(inside);
     drawWave(inside);
     // The view starts at the cycle in which the terms of the pixel are added.
-    const chosen = [...inside.taken].find(([, n]) => n === inside.start + x - codes.x[span]);
-    setClock(chosen[0] + design.stages[1].to);
+    const chosen = [...inside.shaded].find(([, n]) => n === inside.start + x - codes.x[span]);
+    setClock(chosen[0]);
     document.body.dataset.inside = `${x},${y},${settings.design}`;
   }
   byId("look").addEventListener("click", () => look(Number(byId("pixel-x").value), Number(byId("pixel-y").value)));
 
   // Exact values of the words of a pixel, by the names of `blysk.sim.engines.probes`. A value is null if the word means
   // nothing for this pixel.
-  function exactValues({ spans, from, settings, model, curve, chord, trace, design }) {
+  function exactValues({ spans, from, settings, model, texture, curve, chord }) {
     const { one } = site.tables;
     const normal = [0, 0, 0];
+    const albedo = [1, 1, 1];
+    const color = texture && core.albedoOf(spans, texture, albedo);
     const shade = core.shader(settings, settings.viewer, model, chord);
     const terms = core.termsOf(settings);
     const slope = model.slopes?.[settings.exponent - 1];
@@ -529,7 +565,8 @@ const blysk = (() => {
         const span = spans.span[fragment];
         const t = (fragment - spans.first[span]) / Math.max(spans.codes.length[span] - 1, 1);
         core.curveOf(curve, spans, span, one, normal)(t);
-        const { cosine, highlight, diffuse, specular, color } = shade(normal);
+        if (color) color(span, fragment - spans.first[span]);
+        const { cosine, highlight, diffuse, specular, surface, color: light } = shade(normal, albedo);
         const away = 1 - highlight;
         const product = cosine > 0 && slope !== undefined && slope * away < 1 ? slope * away : null;
         const base = product === null ? null : 1 - product;
@@ -540,12 +577,30 @@ const blysk = (() => {
           ...{ product, base, base_2: power(2), base_4: power(4), base_8: power(8), diffuse, specular },
           red_diffuse: 255 * diffuse * terms.diffuse[0],
           red_specular: 255 * specular * terms.specular[0],
-          red: 255 * color[0],
-          ...{ r: core.encoded(color[0]), g: core.encoded(color[1]), b: core.encoded(color[2]) },
+          albedo: albedo[0],
+          red_surface: 255 * surface[0],
+          red: 255 * light[0],
+          ...{ r: core.encoded(light[0]), g: core.encoded(light[1]), b: core.encoded(light[2]) },
         });
       }
       return found.get(n)[name] ?? null;
     };
+  }
+
+  // The pixel to which a word of some age belongs; `undefined` if the age does not tell it. Pixels may wait in three
+  // places: before the lights, behind them for their albedo, and behind the intensity unit for their coordinates.
+  function pixelAt({ code, taken, shaded, given, lit, done }, age, clock) {
+    const any = (name, from, to) => {
+      for (let k = Math.max(from, 1); k < to; k++) if (code(name, k)) return true;
+      return false;
+    };
+    if (age < 0) return any("waits", clock - 4, clock - age) ? undefined : taken.get(clock - age);
+    if (age === 0) return taken.get(clock);
+    if (age === lit) return shaded.get(clock);
+    if (age >= done) return given.get(clock - age + done);
+    if (age > lit) return any("held", clock - age + lit, clock) ? undefined : shaded.get(clock - age + lit);
+    const pixel = taken.get(clock - age);
+    return shaded.get(clock - age + lit) === pixel ? pixel : undefined;
   }
 
   // A word in a cycle: its code, its value, the pixel that it belongs to, the exact value and the error.
@@ -553,11 +608,7 @@ const blysk = (() => {
     const field = inside.design.ports.status.fields[probe.name];
     const code = inside.code(probe.name, clock);
     const value = core.decoded(code, field);
-    // If a pixel waited for the lights in a late cycle, the pixels behind it are late, too. Then `age` does not tell
-    // the pixel.
-    let late = false;
-    for (let k = Math.max(clock - 4, 1); k < clock - probe.age; k++) late ||= inside.code("waits", k) === 1;
-    const pixel = late ? undefined : inside.taken.get(clock - probe.age);
+    const pixel = pixelAt(inside, probe.age, clock);
     let exact = pixel === undefined || !probe.exact ? null : inside.exact(probe.exact, pixel);
     const isDark = ["argument", "product", "base", "square", "square_2", "square_3"].includes(probe.name);
     if (exact !== null && isDark && (inside.exact("product", pixel) === null || gatedAt(inside, pixel))) exact = null;
@@ -707,8 +758,13 @@ const blysk = (() => {
           ? "Another span is in its setup. The pixels of this span are in the other stages."
           : "No span is in the setup.";
     } else {
+      // A pixel that waits stays at the end of the lights, or of the intensity unit.
+      const { lit, done, trace } = inside;
+      const shaded = [...inside.shaded.keys()];
       for (const [taken, n] of inside.taken) {
-        const age = clock - taken;
+        const [after, gone] = [clock - shaded[n], clock - trace.cycles[n]];
+        let age = after < 0 ? Math.min(clock - taken, lit) : Math.min(lit + after, done - 1);
+        if (gone >= 0) age = done + gone;
         if (age > stage.from && age <= stage.to) inHere.set(n, (age - stage.from - 0.5) / (stage.to - stage.from));
       }
     }

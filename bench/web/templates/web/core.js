@@ -37,15 +37,15 @@ const blyskCore = () => {
     return new Uint8Array(await new Response(stream).arrayBuffer());
   }
 
-  // Decodes the spans of a view. The bytes are: the numbers of spans and of fragments, a column for each field, and a
-  // bit for each fragment that tells whether it is visible. A column has the lowest bytes of all codes first.
+  // Decodes the spans of a view. The bytes are: the numbers of spans, fragments and columns, a column for each field, and
+  // a bit for each fragment that tells whether it is visible. A column has the lowest bytes of all codes first.
   function spansOf(bytes, columns) {
     const counts = new DataView(bytes.buffer, bytes.byteOffset);
     const count = counts.getUint32(0, true);
     const fragments = counts.getUint32(4, true);
     const codes = {};
-    let at = 8;
-    for (const column of columns) {
+    let at = 12;
+    for (const column of columns.slice(0, counts.getUint32(8, true))) {
       const values = new Int32Array(count);
       for (let byte = 0; byte < column.bytes; byte++)
         for (let k = 0; k < count; k++) values[k] |= bytes[at++] << (8 * byte);
@@ -65,6 +65,78 @@ const blyskCore = () => {
     const span = new Int32Array(fragments);
     for (let k = 0; k < count; k++) span.fill(k, first[k], first[k + 1]);
     return { count, fragments, shown, codes, visible, first, span };
+  }
+
+  // Albedo: the colour of the surface at a pixel.
+
+  // A texture from its picture, which has codes of sRGB, and from the halves of words that load it, 3 bytes each. Level 0
+  // is the picture in linear light. Each texel of a further level is the mean of the texels that it covers.
+  function textureOf({ width, height, descriptor }, picture, halves) {
+    const levels = [{ width, height, texels: Float64Array.from(picture, (code) => linear(code / 255)) }];
+    for (let above = levels[0]; above.width > 1 || above.height > 1; above = levels[levels.length - 1]) {
+      const [columns, rows] = [Math.max(above.width >> 1, 1), Math.max(above.height >> 1, 1)];
+      const [across, down] = [above.width / columns, above.height / rows];
+      const texels = new Float64Array(3 * columns * rows);
+      for (let row = 0; row < above.height; row++)
+        for (let column = 0; column < above.width; column++)
+          for (let c = 0; c < 3; c++) {
+            const at = 3 * (Math.floor(row / down) * columns + Math.floor(column / across)) + c;
+            texels[at] += above.texels[3 * (row * above.width + column) + c] / (across * down);
+          }
+      levels.push({ width: columns, height: rows, texels });
+    }
+    const words = Int32Array.from({ length: halves.length / 3 }, (_, k) =>
+      halves[3 * k] | (halves[3 * k + 1] << 8) | (halves[3 * k + 2] << 16),
+    );
+    return { descriptor, halves: words, levels };
+  }
+
+  // Mean of the four texels around a place (u, v) of a level, in texels. The texture repeats its picture.
+  function sampled({ width, height, texels }, u, v, found) {
+    const [column, row] = [Math.floor(u - 0.5), Math.floor(v - 0.5)];
+    const [right, down] = [u - 0.5 - column, v - 0.5 - row];
+    found[0] = found[1] = found[2] = 0;
+    for (let corner = 0; corner < 4; corner++) {
+      const [i, j] = [corner & 1, corner >> 1];
+      const share = (i ? right : 1 - right) * (j ? down : 1 - down);
+      const at = 3 * (((row + j) & (height - 1)) * width + ((column + i) & (width - 1)));
+      for (let c = 0; c < 3; c++) found[c] += share * texels[at + c];
+    }
+  }
+
+  // Albedo along spans, from the words of their lines: vertex colour times colour of the texture, without any rounding.
+  // The returned function of a span and the number of a pixel in it writes to `albedo`.
+  function albedoOf({ codes }, { levels }, albedo) {
+    const line = (name) => [codes[`attributes.start.${name}`], codes[`attributes.step.${name}`]];
+    const [weight, red, green, blue] = ["weight", "colors.0", "colors.1", "colors.2"].map(line);
+    const [across, down] = ["coordinates.0", "coordinates.1"].map(line);
+    const [exponents, ranges, level] = ["exponent", "range", "level"].map((name) => codes[`attributes.${name}`]);
+    const [left, upper] = [0, 1].map((c) => codes[`attributes.base.${c}`]);
+    return (span, pixel) => {
+      const along = pixel * 2 ** -exponents[span];
+      const w = weight[0][span] + along * weight[1][span];
+      const attribute = ([start, step]) => (start[span] + along * step[span]) / w;
+      const scale = 2 ** ranges[span];
+      const place = [left[span] + scale * attribute(across), upper[span] + scale * attribute(down)];
+      sampled(levels[level[span]], ...place, albedo);
+      albedo[0] *= attribute(red);
+      albedo[1] *= attribute(green);
+      albedo[2] *= attribute(blue);
+    };
+  }
+
+  // Albedo of the visible fragments, in the order of the spans.
+  function albedosOf(spans, texture) {
+    const values = new Float64Array(3 * spans.shown);
+    const albedo = [0, 0, 0];
+    const along = albedoOf(spans, texture, albedo);
+    let at = 0;
+    for (let n = 0; n < spans.fragments; n++) {
+      if (!spans.visible[n]) continue;
+      along(spans.span[n], n - spans.first[spans.span[n]]);
+      for (let c = 0; c < 3; c++) values[at++] = albedo[c];
+    }
+    return values;
   }
 
   // Unit vectors and the constants of a frame, as `blysk.golden.frame_constants` makes them.
@@ -185,7 +257,7 @@ const blyskCore = () => {
     return found;
   }
 
-  function constantsOf(settings, viewer, tables, lobe = null, vectors = null) {
+  function constantsOf(settings, viewer, tables, lobe = null, vectors = null, texture = null) {
     const terms = termsOf(settings);
     const code = (intensities) => intensities.map((part) => colorCode(part, tables.color));
     const direction = normalised(settings.direction);
@@ -201,6 +273,7 @@ const blyskCore = () => {
       diffuse: code(terms.diffuse),
       specular: lit ? code(terms.specular) : [0, 0, 0],
       ...(lobe && { threshold: lobe.thresholds[row], lobe: tableOf(lobe, lobe.parameters[row]) }),
+      ...(texture && { emission: [0, 0, 0], texture: texture.descriptor, texels: texture.halves }),
     };
   }
 
@@ -232,17 +305,20 @@ const blyskCore = () => {
   // Beats of the write port that write the constants of a frame.
   function writesOf(constants, tables, port) {
     const beats = [];
-    for (const [fields, base] of [
-      [tables.frame, 0],
-      [tables.light, tables.stride],
-    ])
-      for (const [name, [first, count]] of Object.entries(fields))
-        for (let k = 0; k < count; k++) beats.push([base + first + k, constants[name][k]]);
+    const add = (base, values) => values.forEach((value, k) => beats.push([base + k, value]));
+    for (const [name, [first]] of Object.entries(tables.frame)) add(first, constants[name]);
     if (constants.lobe) {
       if (constants.threshold !== null) beats.push([tables.threshold, constants.threshold]);
       beats.push([tables.lobe, 1 << 17]);
       for (const value of constants.lobe) beats.push([tables.lobe, value]);
     }
+    if (constants.texture) {
+      add(tables.emission, constants.emission);
+      add(tables.texture, constants.texture);
+      beats.push([tables.texels, 0]);
+      for (const value of constants.texels) beats.push([tables.texel, value]);
+    }
+    for (const [name, [first]] of Object.entries(tables.light)) add(tables.stride + first, constants[name]);
     const words = new Uint32Array(beats.length * port.words);
     beats.forEach(([address, data], k) => {
       put(words, k * port.words, port.fields.address, address);
@@ -324,7 +400,8 @@ const blyskCore = () => {
     };
   }
 
-  // The returned function computes, from the normal of a pixel: N·L, N·H or R·V, both terms, and the color.
+  // The returned function computes, from the normal and the albedo of a pixel: N·L, N·H or R·V, both terms, the light that
+  // the albedo multiplies, and the color.
   function shader(settings, viewer, model, chord) {
     const direction = normalised(settings.direction);
     const halfway = halfwayVector(direction, viewer);
@@ -332,8 +409,8 @@ const blyskCore = () => {
     const between = direction.reduce((sum, part, k) => sum + part * viewer[k], 0);
     const { ambient, diffuse, specular } = termsOf(settings);
     const reflect = reflection(model, settings[model.parameter ?? "exponent"]);
-    const found = { cosine: 0, highlight: 0, diffuse: 0, specular: 0, color: [0, 0, 0] };
-    return (normal) => {
+    const found = { cosine: 0, highlight: 0, diffuse: 0, specular: 0, surface: [0, 0, 0], color: [0, 0, 0] };
+    return (normal, albedo = [1, 1, 1]) => {
       found.cosine = normal[0] * direction[0] + normal[1] * direction[1] + normal[2] * direction[2];
       found.highlight = normal[0] * halfway[0] + normal[1] * halfway[1] + normal[2] * halfway[2];
       if (model.mirror) {
@@ -345,8 +422,10 @@ const blyskCore = () => {
       }
       found.diffuse = Math.max(found.cosine, 0);
       found.specular = lit && found.cosine > 0 ? reflect(Math.min(found.highlight, 1)) : 0;
-      for (let c = 0; c < 3; c++)
-        found.color[c] = ambient[c] + found.diffuse * diffuse[c] + found.specular * specular[c];
+      for (let c = 0; c < 3; c++) {
+        found.surface[c] = ambient[c] + found.diffuse * diffuse[c];
+        found.color[c] = found.surface[c] * albedo[c] + found.specular * specular[c];
+      }
       return found;
     };
   }
@@ -373,8 +452,8 @@ const blyskCore = () => {
   }
 
   // Channels of the visible fragments in LSB of sRGB, in the order of the spans, not rounded. The formulas are those of
-  // `shader`, in one loop for speed.
-  function reference(normals, settings, viewer, model, chord) {
+  // `shader`, in one loop for speed. Without `albedos` the albedo is 1.
+  function reference(normals, settings, viewer, model, chord, albedos = null) {
     const values = new Float64Array(normals.length);
     const [lx, ly, lz] = normalised(settings.direction);
     const halfway = halfwayVector([lx, ly, lz], viewer);
@@ -398,8 +477,8 @@ const blyskCore = () => {
       }
       const front = cosine > 0 ? cosine : 0;
       for (let c = 0; c < 3; c++) {
-        const color = ambient[c] + front * diffuse[c] + shine * specular[c];
-        values[at + c] = encoded(color);
+        const surface = ambient[c] + front * diffuse[c];
+        values[at + c] = encoded((albedos ? albedos[at + c] * surface : surface) + shine * specular[c]);
       }
     }
     return values;
@@ -441,11 +520,14 @@ const blyskCore = () => {
       return new Uint32Array(this.exports.memory.buffer, at, count);
     }
 
-    // Packs the spans `from` to `to - 1` as input beats. A trace needs only a few spans.
-    load(spans, from = 0, to = spans.count) {
+    // Packs the spans `from` to `to - 1` as input beats. A trace needs only a few spans. A design with an albedo needs a
+    // texture.
+    load(spans, texture = null, from = 0, to = spans.count) {
       const port = this.design.ports.i;
       this.exports.release();
       this.spans = spans;
+      this.texture = texture;
+      this.texels = texture ? texture.halves.length : 0;
       this.from = from;
       this.count = to - from;
       this.fragments = spans.first[to] - spans.first[from];
@@ -453,7 +535,7 @@ const blyskCore = () => {
       this.output = this.reserve(this.fragments * this.design.ports.o.words * 4);
       this.cycles = this.reserve(this.fragments * 8);
       this.inputClocks = this.reserve(this.count * 8);
-      this.writes = this.reserve(4096);
+      this.writes = this.reserve(4 * this.design.ports.write.words * (1024 + this.texels));
       const words = this.words(this.input, this.count * port.words).fill(0);
       for (const [name, field] of Object.entries(port.fields))
         if (spans.codes[name])
@@ -477,7 +559,7 @@ const blyskCore = () => {
 
     prepare(settings, viewer) {
       if (this.plain) this.turn(settings, viewer);
-      const constants = constantsOf(settings, viewer, this.tables, this.design.lobe, this.design.vectors);
+      const constants = constantsOf(settings, viewer, this.tables, this.design.lobe, this.design.vectors, this.texture);
       const { words, count } = writesOf(constants, this.tables, this.design.ports.write);
       this.words(this.writes, words.length).set(words);
       this.exports.prepare(
@@ -506,7 +588,7 @@ const blyskCore = () => {
     // came out.
     trace(settings, viewer) {
       const size = this.design.ports.status.words;
-      const limit = 4096;
+      const limit = 4096 + this.texels;
       const rows = this.reserve(4 * size * limit);
       const ended = this.reserve(4);
       this.prepare(settings, viewer);
@@ -525,7 +607,7 @@ const blyskCore = () => {
   }
 
   return {
-    ...{ put, get, decoded, unpacked, spansOf, normalised, halfwayVector, quantised, termsOf, constantsOf, writesOf },
+    ...{ put, get, decoded, unpacked, spansOf, textureOf, albedoOf, albedosOf, normalised, halfwayVector, quantised, termsOf, constantsOf, writesOf },
     ...{ encoded, linear, lightFrame, vectorsOf, reflection, tableOf, curveOf, normalsOf, shader, reference, errorFigures, Simulation },
   };
 };

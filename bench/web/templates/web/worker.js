@@ -2,18 +2,18 @@
 const blyskWorker = (core) => {
   const designs = new Map();
   const views = new Map();
+  const textures = new Map();
   const simulations = new Map();
-  const normals = new Map();
+  const fragments = new Map();
   let settingsOfPage = null;
 
-  // Stored normals by spans and curve. A view has the same normals in each frame.
-  const normalsOf = (name, spans, curve) => {
-    const key = `${name} ${curve}`;
-    if (!normals.has(key)) {
-      if (normals.size > 3) normals.clear();
-      normals.set(key, core.normalsOf(spans, curve, settingsOfPage.tables.one));
+  // Stored values of fragments, by a key. A view has the same normals and the same albedo in each frame.
+  const stored = (key, make) => {
+    if (!fragments.has(key)) {
+      if (fragments.size > 3) fragments.clear();
+      fragments.set(key, make());
     }
-    return normals.get(key);
+    return fragments.get(key);
   };
 
   const empty = (color) => {
@@ -112,16 +112,21 @@ const blyskWorker = (core) => {
     if (!simulations.has(key)) {
       if (simulations.size > 1) simulations.delete(simulations.keys().next().value);
       const simulation = new core.Simulation(module, design, settingsOfPage.tables);
-      simulation.load(views.get(settings.spans));
+      simulation.load(views.get(settings.spans), textures.get(settings.texture));
       simulations.set(key, simulation);
     }
     return { spans: views.get(settings.spans), design, simulation: simulations.get(key) };
   };
 
   const exactOf = (settings, entry, model) => {
-    const { reference, viewer } = settings;
-    const found = normalsOf(settings.spans, entry.spans, reference.curve);
-    return core.reference(found, settings, viewer, model, reference.chord);
+    const { reference, viewer, spans: name } = settings;
+    const { spans } = entry;
+    const found = stored(`${name} ${reference.curve}`, () =>
+      core.normalsOf(spans, reference.curve, settingsOfPage.tables.one),
+    );
+    const texture = textures.get(settings.texture);
+    const albedos = texture && stored(`${name} albedo`, () => core.albedosOf(spans, texture));
+    return core.reference(found, settings, viewer, model, reference.chord, albedos);
   };
 
   const answer = {
@@ -133,6 +138,9 @@ const blyskWorker = (core) => {
     },
     spans: ({ name, bytes }) => {
       views.set(name, core.spansOf(bytes, settingsOfPage.columns));
+    },
+    texture: ({ name, texture }) => {
+      textures.set(name, texture);
     },
     frame: ({ settings, model, rival }) => {
       const entry = load(settings);
@@ -170,7 +178,7 @@ const blyskWorker = (core) => {
       const { spans, design } = load(settings);
       const { module } = designs.get(settings.design);
       const short = new core.Simulation(module, design, settingsOfPage.tables);
-      short.load(spans, from, to);
+      short.load(spans, textures.get(settings.texture), from, to);
       const trace = short.trace(settings, settings.viewer);
       return [trace, [trace.rows.buffer]];
     },
