@@ -8,7 +8,18 @@ from blysk.golden.lighting.highlight_operand import MAX_EXPONENT
 if TYPE_CHECKING:
     from blysk.golden.geometry.coarse_depth import CoarseDepth
 
-__all__ = ["PIPES", "PORTS", "SETUPS", "STREAMS", "STYLES", "TOPS", "Build", "BuildError", "Style"]
+__all__ = [
+    "LANES",
+    "PIPES",
+    "PORTS",
+    "SETUPS",
+    "STREAMS",
+    "STYLES",
+    "TOPS",
+    "Build",
+    "BuildError",
+    "Style",
+]
 
 Style = Literal["throughput", "compact"]
 """Name of a style."""
@@ -18,6 +29,9 @@ STYLES: tuple[Style, ...] = ("throughput", "compact")
 
 PIPES = (1, 2, 4, 8)
 """Numbers of shading pipelines."""
+
+LANES = (1, 2)
+"""Numbers of lanes of a shading pipeline: pixels in a beat."""
 
 SETUPS = (1, 2)
 """Numbers of lanes of triangle setup."""
@@ -67,6 +81,9 @@ class Build:
         largest number of all.
     exponent : int or None
         Specular exponent, fixed at build time; ``None``: the exponent is a frame constant.
+    lanes : {1, 2}
+        Lanes of a pipeline. With two lanes an output beat has two neighbouring pixels of a span. Only the
+        method ``quotient`` serves them.
     pipes : {1, 2, 4, 8}
         Number of pipelines, see `PixelPipelines`.
     merged : bool
@@ -94,6 +111,7 @@ class Build:
     style: Style = "throughput"
     setup_interval: int | None = None
     exponent: int | None = None
+    lanes: int = 1
     pipes: int = 1
     merged: bool = False
     top: str = "shader"
@@ -122,6 +140,7 @@ class Build:
             raise BuildError("stream", "the core's own ports are no AXI4-Stream", "also give bus")
         if self.merged and self.pipes == 1:
             raise BuildError("merged", "one pipeline has one stream", "also give pipes")
+        self._check_lanes()
         triangles = "use top geometry or render"
         if self.setups > 1 and not self.takes_triangles:
             raise BuildError("setups", "spans need no triangle setup", triangles)
@@ -130,10 +149,23 @@ class Build:
         if self.coarse is not None and self.top != "render":
             raise BuildError("coarse", "it needs a core from triangles to pixels", "also give top render")
 
+    def _check_lanes(self) -> None:
+        """Refuse options that exclude several lanes."""
+        if self.lanes == 1:
+            return
+        for excludes, reason, remedy in (
+            (self.compact, "a pixel of the compact style takes several cycles", "use the throughput style"),
+            (self.takes_triangles, "the depth test takes single pixels", "leave out lanes, or use spans"),
+            (self.pipes > 1, "several pipelines give single pixels", "leave out lanes or pipes"),
+            (self.bus != "native", f"a core on {self.bus} gives single pixels", "leave out lanes or bus"),
+        ):
+            if excludes:
+                raise BuildError("lanes", reason, remedy)
+
     @property
     def shading(self) -> "Build":
         """The options of one shading pipeline, with all others at their defaults."""
-        return Build(self.style, self.setup_interval, self.exponent)
+        return Build(self.style, self.setup_interval, self.exponent, self.lanes)
 
     @property
     def takes_triangles(self) -> bool:
@@ -153,6 +185,7 @@ class Build:
 
 _CHOICES = {
     "style": STYLES,
+    "lanes": LANES,
     "pipes": PIPES,
     "top": TOPS,
     "setups": SETUPS,

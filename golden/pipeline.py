@@ -79,7 +79,8 @@ class ShadingPipeline:
         - there are factors, but no specular light, or the method takes no values;
         - the transfer is unknown;
         - the albedo has tints, but there is no specular light;
-        - texels are outside of several pipelines, or of a core on a bus (a `BuildError`).
+        - texels are outside of several pipelines, or of a core on a bus (a `BuildError`);
+        - there are several lanes, and an albedo, or a method of single pixels (a `BuildError`).
 
     Source: docs/theory/units.md#pipeline; [T] figure 4.10.
     """
@@ -99,7 +100,7 @@ class ShadingPipeline:
     build: Build = field(default_factory=Build)
 
     def __post_init__(self) -> None:
-        method = self.interpolator.matched(self.specular)
+        method = self.interpolator.matched(self.specular).for_lanes(self.build.lanes)
         object.__setattr__(self, "interpolator", method)
         object.__setattr__(self, "specular", self.specular and method.unit_for(self.specular))
         Intensity(self.lights)
@@ -118,6 +119,8 @@ class ShadingPipeline:
             raise ValueError(f"transfer must be one of {', '.join(TRANSFERS)}, not {self.transfer!r}")
         if self.albedo is not None and self.albedo.tints and not self.has_highlights:
             raise ValueError("an albedo with tints needs specular light")
+        if self.build.lanes > 1:
+            self._check_lanes()
         if self.texels_outside and (self.build.pipes > 1 or self.build.bus != "native"):
             option = "pipes" if self.build.pipes > 1 else "bus"
             remedy = f"leave out {option}, or take a texel memory inside"
@@ -125,6 +128,11 @@ class ShadingPipeline:
         object.__setattr__(self, "factors", tuple(self.factors))
         if self.factors:
             self._check_factors()
+
+    def _check_lanes(self) -> None:
+        """Refuse parts that serve one pixel a cycle."""
+        if self.albedo is not None:
+            raise BuildError("lanes", "an albedo comes pixel by pixel", "leave out lanes or the albedo")
 
     def _check_factors(self) -> None:
         """Refuse factors of lights that do not exist, and factors that no unit of the design takes."""

@@ -19,8 +19,8 @@ from blysk.hdl.core.stream import FIFO_LATENCY, SLICE_LATENCY, connect, connect_
 from blysk.hdl.core.views import copy, copy_fields
 from blysk.hdl.frame_constants import FrameConstantsUnit, existing_material, write_shape
 from blysk.hdl.methods.registry import unit_of
-from blysk.hdl.pixel_assembler import PixelAssemblerUnit, coordinates_shape, pixel_shape
-from blysk.hdl.pixel_shading import COMPACT_INTERVAL, PixelShading
+from blysk.hdl.pixel_assembler import PixelAssemblerUnit, coordinates_shape
+from blysk.hdl.pixel_shading import COMPACT_INTERVAL, PixelShading, connect_lanes, each_lane
 from blysk.hdl.port_descriptions import SPAN_COUNTER_BITS
 
 __all__ = ["ShadingPipelineUnit", "span_shape", "status_shape"]
@@ -102,6 +102,10 @@ class ShadingPipelineUnit(wiring.Component):
     of its span, or the pixel waits for the decision. So a method with a shorter setup than the gate, such as
     ``linear``, may take a cycle more for short spans.
 
+    With two lanes a beat of ``o`` has two neighbouring pixels of a span, see `beat_shape`. The interpolator
+    makes the operands of both pixels, and each lane has units of its own from there to the colours. In the
+    rules above beats take the place of pixels. A span of two pixels is a pair, see `QuotientLanesUnit`.
+
     Without lights there is neither interpolator nor multiplier. Every pixel has the ambient colour.
 
     With an albedo an albedo unit processes each span in parallel with the interpolator. A FIFO holds the
@@ -149,7 +153,7 @@ class ShadingPipelineUnit(wiring.Component):
     i : :py:`In(stream.Signature(span_shape(model)))`
         Spans.
     o : :py:`Out(stream.Signature(pixel_shape(x_bits, y_bits)))`
-        Pixels.
+        Pixels. With several lanes the payload is ``beat_shape(x_bits, y_bits, lanes)``.
     write : :py:`In(stream.Signature(write_shape()))`
         Frame constants; see `FrameConstantsUnit` for the addresses.
     texel_request, texel_response
@@ -168,9 +172,10 @@ class ShadingPipelineUnit(wiring.Component):
 
     def __init__(self, model: ShadingPipeline | None = None):
         self.model = p = model or ShadingPipeline()
+        self._assembler = PixelAssemblerUnit(p.x_bits, p.y_bits, p.length_bits, p.build.lanes)
         members = {
             "i": In(stream.Signature(span_shape(p))),
-            "o": Out(stream.Signature(pixel_shape(p.x_bits, p.y_bits))),
+            "o": Out(self._assembler.o.signature),
             "write": In(stream.Signature(write_shape())),
             "status": Out(status_shape()),
         }
@@ -179,9 +184,9 @@ class ShadingPipelineUnit(wiring.Component):
             members["texel_request"] = Out(stream.Signature(texel_request_shape(memory)))
             members["texel_response"] = In(stream.Signature(texels_shape()))
         super().__init__(members)
-        self._assembler = PixelAssemblerUnit(p.x_bits, p.y_bits, p.length_bits)
         self._interpolator = self._gate = None
-        self._shading = PixelShading(p)
+        self._lanes = [PixelShading(p) for _ in range(p.build.lanes)]
+        self._shading, *self._further = self._lanes
         self._albedo = None
         self.direction = Signal(normal_shape(), name="first_direction")
         self.setup_interval = self._shortest_interval = self.cycles_per_pixel = 1
@@ -223,6 +228,7 @@ class ShadingPipelineUnit(wiring.Component):
             length_bits=p.length_bits,
             product_interval=product_interval,
             factors=p.factors,
+            **({"lanes": p.build.lanes} if p.build.lanes > 1 else {}),
         )
         self.setup_interval = self._interpolator.setup_interval
         self._shortest_interval = self._interpolator.shortest_interval
@@ -271,6 +277,9 @@ class ShadingPipelineUnit(wiring.Component):
         elif albedo is not None:
             m.submodules.intensity = self._shading.intensity
             self._shading.connect(m, frame.constants, None, None, albedo, assembler.colors)
+        elif self._further:
+            for inner, shading, colors in each_lane(m, self._lanes, assembler.colors):
+                shading.connect_constant(inner, frame.constants.ambient, colors)
         else:
             self._shading.connect_constant(m, frame.constants.ambient, assembler.colors)
         connect(m, assembler.o, wiring.flipped(self.o))
@@ -416,6 +425,17 @@ class ShadingPipelineUnit(wiring.Component):
         operands, gated = interpolator.o, None
         if self._gate is not None:
             operands, gated = self._decide(m, frame, sinks)
+        if self._further:
+            connect_lanes(
+                m,
+                self._lanes,
+                frame.constants,
+                operands,
+                self._assembler.colors,
+                self.write.payload,
+                self._written,
+            )
+            return sinks
         self._shading.connect_tables(m, self.write.payload, self._written)
         self._shading.connect(m, frame.constants, operands, gated, albedo, self._assembler.colors)
         return sinks

@@ -14,7 +14,7 @@ from blysk.hdl.core.stream import connect
 from blysk.hdl.frame_constants import write_shape
 from blysk.hdl.pipeline import ShadingPipelineUnit, span_shape, status_shape
 from blysk.hdl.pixel_assembler import pixel_shape
-from blysk.hdl.pixel_lanes import PixelLanesUnit, lanes_shape
+from blysk.hdl.pixel_joiner import PixelJoinerUnit, joined_shape
 from blysk.hdl.pixel_merger import PixelMergerUnit
 from blysk.hdl.port_descriptions import PORT_DESCRIPTIONS
 
@@ -197,7 +197,7 @@ class _JoinedPipelines(wiring.Component):
 
 
 class WidePipelinesUnit(_JoinedPipelines):
-    """`PixelPipelinesUnit` with one wide stream of pixels, a lane for each pipeline, for simulation.
+    """`PixelPipelinesUnit` with one wide stream of the pixels of all pipelines, for simulation.
 
     No pipeline waits for another. The first pixel leaves an idle unit `latency` cycles after its span was
     accepted.
@@ -211,14 +211,14 @@ class WidePipelinesUnit(_JoinedPipelines):
     -------
     i, write, status
         Those of `PixelPipelinesUnit`.
-    o : :py:`Out(stream.Signature(lanes_shape(pipes, x_bits, y_bits)))`
+    o : :py:`Out(stream.Signature(joined_shape(pipes, x_bits, y_bits)))`
         Pixels that leave on one cycle.
 
     Source: docs/theory/units.md#pipeline.
     """
 
     def __init__(self, model: PixelPipelines | None = None, waiting: int = WAITING_SPANS):
-        super().__init__(model, waiting, PixelLanesUnit, lanes_shape)
+        super().__init__(model, waiting, PixelJoinerUnit, joined_shape)
 
     def elaborate(self, platform):
         """The pipelines, and the unit that joins the pixels of a cycle to one beat."""

@@ -1,5 +1,6 @@
 """From the operands of pixels to their colours: the lights, the intensity and the transfer of a pipeline."""
 
+from collections.abc import Iterator, Sequence
 from functools import reduce
 from operator import and_
 
@@ -17,7 +18,7 @@ from blysk.hdl.lighting.factor import FactorUnit
 from blysk.hdl.lighting.light import LightUnit, kind_of
 from blysk.hdl.lighting.transfer import TransferUnit
 
-__all__ = ["COMPACT_INTERVAL", "PixelShading"]
+__all__ = ["COMPACT_INTERVAL", "PixelShading", "connect_lanes", "each_lane"]
 
 COMPACT_INTERVAL = 3
 """Least cycles of a pixel in the compact style, also with one channel.
@@ -242,3 +243,67 @@ class PixelShading:
                 transfer.o.ready.eq(1),
             ]
         return transfer.i
+
+
+def each_lane(
+    m: Module, lanes: Sequence[PixelShading], colors: stream.Interface
+) -> Iterator[tuple[Module, PixelShading, stream.Interface]]:
+    """Module, shading, and stream of colours of each lane of a pipeline.
+
+    The first lane is in the pipeline's module, and its handshakes serve all lanes.
+
+    Parameters
+    ----------
+    m : Module
+        Module of the pipeline. Further lanes are its submodules ``lane_1``, ``lane_2``, ...
+    lanes : sequence of PixelShading
+        Shading of each lane.
+    colors : stream.Interface
+        Colours of a beat: an array of the colours of all lanes.
+    """
+    for index, shading in enumerate(lanes):
+        lane, inner = f"lane_{index}", m
+        if index:
+            m.submodules[lane] = inner = Module()
+        own = stream.Signature(colors.payload[index].shape()).create(path=(lane, "colors"))
+        yield inner, shading, own
+        m.d.comb += [copy(colors.payload[index], own.payload), own.ready.eq(colors.ready)]
+        if not index:
+            m.d.comb += colors.valid.eq(own.valid)
+
+
+def connect_lanes(
+    m: Module,
+    lanes: Sequence[PixelShading],
+    constants: data.View,
+    operands: stream.Interface,
+    colors: stream.Interface,
+    write: data.View,
+    written: Value,
+) -> None:
+    """Connect the shading of each lane, from the operands of a beat to its colours.
+
+    The units of all lanes are equal and have the same handshakes. So they are in the same state on every
+    cycle.
+
+    Parameters
+    ----------
+    m, lanes, colors
+        As for `each_lane`. The intensity unit of the first lane is a submodule already.
+    constants : View
+        Frame constants.
+    operands : stream.Interface
+        Operands of a beat: an array of the operands of all lanes.
+    write, written
+        As for `PixelShading.connect_tables`.
+    """
+    for index, (inner, shading, own) in enumerate(each_lane(m, lanes, colors)):
+        words = operands.payload[index]
+        of_lane = stream.Signature(words.shape()).create(path=(f"lane_{index}", "operands"))
+        if index:
+            inner.submodules.intensity = shading.intensity
+        shading.connect_tables(inner, write, written)
+        shading.connect(inner, constants, of_lane, None, None, own)
+        m.d.comb += [copy(of_lane.payload, words), of_lane.valid.eq(operands.valid)]
+        if not index:
+            m.d.comb += operands.ready.eq(of_lane.ready)

@@ -2,7 +2,7 @@
 
 from blysk.golden.albedo.attribute_spans import AttributeSpans
 
-__all__ = ["COUNTER_TEXTS", "PORT_DESCRIPTIONS", "SPAN_COUNTER_BITS", "TEXTURE_TEXTS"]
+__all__ = ["COUNTER_TEXTS", "LANE_DESCRIPTIONS", "PORT_DESCRIPTIONS", "SPAN_COUNTER_BITS", "TEXTURE_TEXTS"]
 
 SPAN_COUNTER_BITS = 16
 """Bits of a pipeline's counters of spans, which stop at their largest value."""
@@ -69,3 +69,12 @@ PORT_DESCRIPTIONS = {
     "status_overrun": COUNTER_TEXTS["overrun"],
 }
 """Ports of the pipeline, for the table in its Verilog."""
+
+LANE_DESCRIPTIONS = {
+    "o_x": "column of the pixel of lane 0; lane k has the pixel at column o_x + k",
+    "o_y": "row of the pixels",
+    "o_present": "a bit for each lane with a pixel; lane 0 always has a pixel",
+    "o_colors": "red, green, blue of the pixel of a lane; 0 without a pixel",
+    "o_last": "1 at the last beat of a span",
+}
+"""Pixel ports of a pipeline with several lanes, in place of the pixel ports of `PORT_DESCRIPTIONS`."""

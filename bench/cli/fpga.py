@@ -16,7 +16,7 @@ from blysk.sim.value_types import Choice, OutputFile, Whole
 
 __all__ = ["command"]
 
-_BUILD = {name: BUILD[name] for name in ("pipes", "top", "setups")}
+_BUILD = {name: BUILD[name] for name in ("lanes", "pipes", "top", "setups")}
 _NEEDS = {name: NEEDS[name] for name in ("lights", "albedo")}
 # The committed figures are of linear light.
 _DESIGN = DESIGN | {"transfer": DESIGN["transfer"]._replace(default="linear")}

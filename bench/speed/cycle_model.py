@@ -7,12 +7,13 @@ from amaranth.hdl import UnusedElaboratable
 
 from blysk.bench.accuracy import scene_for
 from blysk.golden.pipeline import ShadingPipeline, Spans
+from blysk.hdl.cosines.quotient_lanes import QuotientLanesUnit
 from blysk.hdl.methods.interpolator import InterpolatorUnit
 from blysk.hdl.pipeline import ShadingPipelineUnit
 from blysk.sim.frames.frame import FrameSimulator
 from blysk.sim.meshes.teapot import teapot
 
-__all__ = ["WAITING", "compare", "frame_cycles", "span_cycles", "unit_of"]
+__all__ = ["WAITING", "beat_cycles", "compare", "frame_cycles", "span_cycles", "unit_of"]
 
 _NEVER = -(1 << 40)
 """This number stands for minus infinity in sums of cycles."""
@@ -77,6 +78,44 @@ def _product(matrices: np.ndarray) -> np.ndarray:
     return matrices[0]
 
 
+def beat_cycles(length: np.ndarray, lanes: int) -> int:
+    """Cycles from the first beat of a sequence of spans to the last beat, of `QuotientLanesUnit`.
+
+    Span k has b_k beats, and its start is taken in cycle s_k. Its turns begin in cycle t_k. Spans of two
+    pixels or more have differences. Let p be the span with differences before span k, and f_p the cycle in
+    which its first differences are taken.
+
+    - The last turn of span k is in ``g_k = t_k`` if it has one pixel, in ``max(t_k + 1, f_p - 3)`` if it is a
+      pair, and a cycle later if it has more pixels. Then ``t_(k+1) = g_k + 1``.
+    - ``f_k = max(g_k + 5, s_p + max(b_p - 1, 1))``
+    - ``s_k = max(s_(k-1) + b_(k-1), t_k + 5, f_k + 1)``
+    - `QuotientLanesUnit.DEPTH` limits the starts that wait: ``t_k >= s_(k-14) - 1``.
+
+    Parameters
+    ----------
+    length : int array, shape (spans,)
+        Pixels of each span, 1 or more.
+    lanes : int
+        Pixels of a beat.
+    """
+    waiting = QuotientLanesUnit.DEPTH - 2
+    starts: list[int] = []
+    turn, free, taken, room, first = 0, 0, -8, 0, None
+    for pixels, beats in zip(length.tolist(), (-(-length // lanes)).tolist(), strict=True):
+        if len(starts) >= waiting:
+            turn = max(turn, starts[-waiting] - 1)
+        last, start = turn, max(free, turn + 5)
+        if pixels > 1:
+            last = max(turn + 1, taken - 3) + (pixels > 2)
+            taken = max(last + 5, room)
+            start = max(start, taken + 1)
+            room = start + max(beats - 1, 1)
+        first = start if first is None else first
+        starts.append(start)
+        turn, free = last + 1, start + beats
+    return free - (first or 0)
+
+
 def frame_cycles(unit: ShadingPipelineUnit, spans: Spans, writes: int) -> int:
     """Cycles of a frame of one material without stalls, from the first write of a constant to the last pixel.
 
@@ -97,8 +136,11 @@ def frame_cycles(unit: ShadingPipelineUnit, spans: Spans, writes: int) -> int:
     writes : int
         Number of writes of constants before the frame.
     """
+    method, lanes = unit._interpolator, unit.model.build.lanes
+    if lanes > 1:
+        length = np.asarray(unit.model.interpolator.sent(spans).length, dtype=np.int64)
+        return 1 + writes + unit.latency + beat_cycles(length, lanes)
     length = np.asarray(spans.length, dtype=np.int64) * unit.cycles_per_pixel
-    method = unit._interpolator
     cycles = span_cycles(length, method.span_intervals(spans), method.room_after)
     return 1 + writes + unit.latency + cycles
 

@@ -136,6 +136,7 @@ def units_of(names: Sequence[str]) -> Iterator[tuple[str, Callable[[], wiring.Co
 _WORDS = {
     "style": "{}",
     "setup_interval": "interval {}",
+    "lanes": "{} pixel lanes",
     "pipes": "{} pipelines",
     "setups": "{} lanes",
 }

@@ -18,6 +18,7 @@ from blysk.bench.units.operands import (
     turned,
 )
 from blysk.bench.units.pipeline_spans import (
+    LANE_DESIGNS,
     any_constants,
     any_spans,
     axes_about,
@@ -157,7 +158,8 @@ def _frames_of(unit, case):
 
 
 def _expect(unit, case):
-    return together([pixel_beats(pixels) for pixels in _frames_of(unit, case)])
+    lanes = unit.model.build.lanes
+    return together([pixel_beats(pixels, lanes) for pixels in _frames_of(unit, case)])
 
 
 def _status(unit, case):
@@ -459,7 +461,7 @@ def _variants():
     for name, design in _OF_VECTORS.items():
         yield name, Variant(partial(ShadingPipelineUnit, design), long=True)
     yield "chord-local", Variant(partial(ShadingPipelineUnit, preset("chord-local", "cosquad")))
-    for name, design in _COLORED.items():
+    for name, design in (LANE_DESIGNS | _COLORED).items():
         yield name, Variant(partial(ShadingPipelineUnit, design), long=True)
     for name, design in (DESIGNS | LONG_DESIGNS).items():
         yield name, Variant(partial(ShadingPipelineUnit, design), long=name in LONG_DESIGNS)
@@ -474,7 +476,7 @@ RECORD = Record(
     status=_status,
     stimuli={
         "spans": Stimulus(_spans, 3000, repeats=3),
-        "frames": Stimulus(_frames, 400, variants=(*_ALL, "srgb, without lights")),
+        "frames": Stimulus(_frames, 400, variants=(*_ALL, "srgb, without lights", "2 lanes")),
         "setups": Stimulus(_every_setup, 60, stalled=False, variants=_ALL),
         "terminator": Stimulus(_terminator, variants=_BOTH),
         "roundings": Stimulus(_roundings, variants=_BOTH),

@@ -34,12 +34,14 @@ from blysk.golden.normals.adaptive_normaliser import AdaptiveNormaliser
 from blysk.golden.number.fixed import Fixed
 from blysk.golden.number.unit_vector import COMPONENT, quantise
 from blysk.golden.pipeline import ShadingPipeline, Spans
+from blysk.golden.presets import preset
 from blysk.golden.reference.geometry import normalise
 from blysk.golden.reference.light_frame import light_frame
 from blysk.hdl.pipeline import span_shape
 from blysk.sim.frames.frame import sample_textures
 
 __all__ = [
+    "LANE_DESIGNS",
     "any_constants",
     "any_spans",
     "axes_about",
@@ -59,6 +61,21 @@ __all__ = [
 
 _LONG_AND_SHORT = ((200, 4095), (3000, 12))
 """Number of spans and their largest length, for long and for short spans."""
+
+LANE_DESIGNS: dict[str, ShadingPipeline] = {
+    name: design.built(lanes=2)
+    for name, design in (
+        ("2 lanes", preset()),
+        ("2 lanes, phong, srgb, 3 materials", preset(model="phong", materials=3, transfer="srgb")),
+        (
+            "2 lanes, no specular light, grey, few bits",
+            preset("quotient", None, 2, grey=True, x_bits=9, y_bits=8, length_bits=5),
+        ),
+        ("2 lanes, 2 lights", preset(lights=2)),
+        ("2 lanes, without lights, srgb", preset(lights=0, transfer="srgb")),
+    )
+}
+"""Pipelines with several lanes, by name."""
 
 
 # Constants.
@@ -215,7 +232,12 @@ def any_spans(rng: np.random.Generator, design: ShadingPipeline, length: np.ndar
 def vectors_for(rng: np.random.Generator, design: ShadingPipeline, length: np.ndarray) -> SpanVectors:
     """Any vectors that spans with given numbers of pixels bring, for a method that takes vectors."""
     highlights = design.specular is not None
-    return any_span_vectors(rng, design.interpolator, design.lights, highlights, length)
+    vectors = any_span_vectors(rng, design.interpolator, design.lights, highlights, length)
+    if design.interpolator.pairs:
+        # In a pair the step is a vector. Some vectors are too short.
+        pair = np.flatnonzero(length == 2)
+        vectors.step[pair] = vectors.start[rng.permutation(len(length))[: len(pair)]]
+    return vectors
 
 
 def spans_in_frame(spans: Spans, light: np.ndarray, halfway: np.ndarray) -> tuple[Spans, np.ndarray]:

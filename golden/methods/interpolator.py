@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any, ClassVar, Literal, NamedTuple
 import numpy as np
 
 from blysk.golden.beats import Spans
+from blysk.golden.build import BuildError
 from blysk.golden.cosines.chord_setup import ChordSetup
 from blysk.golden.cosines.quotient_spans import QuotientSpans
 from blysk.golden.frame_constants import NOT_READ, FrameConstants, LightMeanings
@@ -247,6 +248,25 @@ class Interpolator(ABC):
             If the method cannot feed the unit.
         """
         return self
+
+    def for_lanes(self, lanes: int) -> "Interpolator":
+        """The method for a pipeline with a number of lanes.
+
+        Raises
+        ------
+        BuildError
+            If the method does not serve several lanes.
+        """
+        if lanes > 1:
+            raise BuildError("lanes", f"method {self.name} makes single pixels", "take the method quotient")
+        return self
+
+    def sent(self, spans: Spans) -> Spans:
+        """Spans as the pipeline takes them, with the same pixels in the same order.
+
+        With several lanes neighbouring spans may become one span.
+        """
+        return spans
 
     def unit_for(self, specular: HighlightOperand) -> HighlightOperand:
         """The specular unit that has the model of a given unit and takes the method's operand, in its scale.

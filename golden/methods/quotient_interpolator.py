@@ -8,6 +8,7 @@ import numpy as np
 
 from blysk.golden.beats import Spans
 from blysk.golden.cosines.quotient import Quotient
+from blysk.golden.cosines.quotient_lanes import separate_pairs
 from blysk.golden.cosines.quotient_spans import MARGIN, QuotientSpans, SpanVectors
 from blysk.golden.frame_constants import FrameConstants, LightMeanings
 from blysk.golden.lighting.highlight_operand import HighlightOperand
@@ -47,11 +48,15 @@ class QuotientInterpolator(Interpolator):
     ----------
     mirror : bool
         Whether the highlight is Phong's, of R·V, in place of N·H.
+    pairs : bool
+        Whether a span of two pixels is a pair, see `QuotientLanes`. A pipeline with several lanes takes
+        pairs.
 
     Source: docs/theory/quotient.md.
     """
 
     mirror: bool = False
+    pairs: bool = False
 
     operand: ClassVar = "place"
     COSINE_FORMAT = Quotient.COSINE_FORMAT
@@ -100,6 +105,33 @@ class QuotientInterpolator(Interpolator):
         mirror = specular is not None and specular.reflection.MIRROR
         return self if mirror == self.mirror else replace(self, mirror=mirror)
 
+    def for_lanes(self, lanes: int) -> "QuotientInterpolator":
+        """The method, with pairs for several lanes."""
+        return self if (lanes > 1) == self.pairs else replace(self, pairs=lanes > 1)
+
+    def sent(self, spans: Spans) -> Spans:
+        """Spans in which two neighbours of one pixel each become a pair, if the pipeline takes pairs."""
+        if not self.pairs or spans.vectors is None:
+            return spans
+        after = [np.asarray(column)[1:] for column in (spans.x, spans.y, spans.length, spans.material)]
+        x, y, length, material = (
+            np.asarray(column)[:-1] for column in (spans.x, spans.y, spans.length, spans.material)
+        )
+        joins = (length == 1) & (after[2] == 1) & (after[0] == x + 1)
+        joins &= (after[1] == y) & (after[3] == material)
+        # Of a row of neighbours the first two are a pair, then the next two.
+        begins = np.flatnonzero(joins & ~np.r_[False, joins[:-1]])
+        place = np.arange(len(joins))
+        place -= begins[np.maximum(np.searchsorted(begins, place, "right") - 1, 0)] if len(begins) else 0
+        first = np.flatnonzero(joins & (place % 2 == 0))
+        vectors = SpanVectors(*(codes.copy() for codes in spans.vectors))
+        vectors.step[first], vectors.exponent[first] = vectors.start[first + 1], 0
+        lengths = np.array(spans.length)
+        lengths[first] = 2
+        kept = np.ones(len(spans), dtype=bool)
+        kept[first + 1] = False
+        return replace(spans, length=lengths, vectors=vectors)[kept]
+
     def unit_for(self, specular: HighlightOperand) -> HighlightOperand:
         """The unit, if it takes places. Else a `QuotientLobe` of its model, with the same tables."""
         if specular.operand == self.operand:
@@ -142,7 +174,14 @@ class QuotientInterpolator(Interpolator):
             "i_exponent: the largest with which i_step fits, at most ceil(log2(length - 1)) + 3",
             "i_length: halve a span if |v| at its ends differs by a factor over 2, or if the ends are over "
             "90 degrees apart",
-            "i_length: divide a span of two pixels into two spans of one pixel, whose step is 0",
+            *(
+                [
+                    "i_length 2 is a pair: i_start and i_step are v at both pixels, each in a scale of its "
+                    "own; i_exponent is not read"
+                ]
+                if self.pairs
+                else ["i_length: divide a span of two pixels into two spans of one pixel, whose step is 0"]
+            ),
             "i_length: after these cuts no |v| is under 1/128; a span with a shorter v is wrong, "
             "and counted in status_out_of_range_spans",
             *([f"constants: as L write sin a, 0, cos a, times {model.ONE}; H is not read"] * highlights),
@@ -221,9 +260,12 @@ class QuotientInterpolator(Interpolator):
         direction : int64 array, shape (lights, 3)
             Codes of L in the frame of each light; y has no effect.
         """
+        span, spans_given = pixels_of(length)[0], len(length)
+        if self.pairs:
+            vectors, length, _ = separate_pairs(vectors, length)
         pixels = spans.compute(vectors, length, direction[:, ::2])
         cosine, place, too_small = Quotient(spans).compute(pixels)
-        return Operands(cosine, place, np.bincount(pixels_of(length)[0], too_small, len(length)) > 0)
+        return Operands(cosine, place, np.bincount(span, too_small, spans_given) > 0)
 
     def highlight_error(
         self, unit: HighlightOperand, parameter: float | None, length: int, error: float

@@ -1,6 +1,5 @@
 """Spans of the quotient method: from vectors of spans to m, w, l and z of a pixel on every cycle."""
 
-import itertools
 from collections.abc import Callable
 from typing import Any
 
@@ -14,6 +13,7 @@ from blysk.hdl.core.bits import select
 from blysk.hdl.core.fixed import FixedShape
 from blysk.hdl.core.memory import HEADED_FIFO_LATENCY, connect_headed_fifo
 from blysk.hdl.cosines.quotient import pixel_words_shape
+from blysk.hdl.cosines.quotient_serial_setup import SerialSetup
 
 __all__ = ["QuotientSpansUnit", "line_directions_shape", "vectors_shape"]
 
@@ -40,7 +40,7 @@ def line_directions_shape(model: QuotientSpans) -> data.ArrayLayout:
     return data.ArrayLayout(data.ArrayLayout(FixedShape(model.COMPONENT_FORMAT), 2), model.lights)
 
 
-class QuotientSpansUnit(wiring.Component):
+class QuotientSpansUnit(SerialSetup, wiring.Component):
     """Words of every pixel of spans, first pixel first; `QuotientSpans` is the bit-accurate model.
 
     *Setup.* The multipliers make ``v·v``, ``v·d`` and ``d·d`` of a span's start v and step d in turns, three
@@ -105,7 +105,7 @@ class QuotientSpansUnit(wiring.Component):
         self.initiation_interval = 3 * self._products if serial else 3
         members = {
             "i": In(stream.Signature(vectors_shape(p, length_bits))),
-            "o": Out(stream.Signature(pixel_words_shape(p))),
+            "o": Out(stream.Signature(self._output_shape())),
             "begun": Out(1),
         }
         if p.highlights:
@@ -132,7 +132,7 @@ class QuotientSpansUnit(wiring.Component):
     def elaborate(self, platform):
         """Turns of the setup, and the accumulators with the words that they take."""
         m = Module()
-        p, pixel = self.model, self.o.payload
+        p = self.model
         # Registers of differences that wait, and the FIFO of starts.
         waiting = data.StructLayout(
             {
@@ -162,6 +162,18 @@ class QuotientSpansUnit(wiring.Component):
         with m.If(advance):
             m.d.sync += halves.eq(takes_first)
         steps = advance & (halves | ~ready)
+        self._accumulate(m, (advance, halves, steps), takes, (second, first), start)
+        return m
+
+    def _accumulate(self, m: Module, moves: Any, takes: Any, words: Any, start: stream.Interface) -> None:
+        """Accumulators of all words, from differences and starts that are taken.
+
+        ``moves`` has three conditions: a pixel may leave; the half of a second difference is added; first
+        differences of squares change.
+        """
+        p, pixel = self.model, self.o.payload
+        (advance, halves, steps), (second, first) = moves, words
+        takes_second, takes_first, takes_start = takes
         for number in range(len(p.squares)):
             names = (f"{name}_{number}" for name in ("square", "difference", "change"))
             value, difference, change = (
@@ -199,7 +211,10 @@ class QuotientSpansUnit(wiring.Component):
         with m.If(advance & takes_start):
             m.d.sync += span.eq(~span)
         m.d.comb += pixel.span.eq(span)
-        return m
+
+    def _output_shape(self) -> data.Layout:
+        """Shape of an output beat."""
+        return pixel_words_shape(self.model)
 
     def _start_shape(self) -> data.StructLayout:
         """Shape of a start: sums without the fraction bits of differences, z, and the length."""
@@ -224,6 +239,9 @@ class QuotientSpansUnit(wiring.Component):
         # drives the multiplexers of all operands.
         begun, is_second, ends = (Signal(name=name) for name in ("has_begun", "is_second", "ends"))
         valid, is_long = self.i.valid, span.length[1:].any()
+        paired, has_second = self._turn_of_a_pair(m, moves, begun, is_second), is_long
+        if paired is not None:
+            has_second = is_long & ~self._is_pair(span.length)
         m.d.comb += [
             ends.eq(Mux(begun, ~is_second, ~is_long)),
             self.i.ready.eq(moves & ends),
@@ -233,7 +251,7 @@ class QuotientSpansUnit(wiring.Component):
         with m.If(moves):
             m.d.sync += [
                 begun.eq(Mux(begun, is_second | ~valid, valid & is_long)),
-                is_second.eq(Mux(begun, is_second & ~valid, valid & is_long)),
+                is_second.eq(Mux(begun, is_second & ~valid, valid & has_second)),
             ]
 
         def register(value, name):
@@ -261,7 +279,8 @@ class QuotientSpansUnit(wiring.Component):
         begin, step = (
             {name: vector[at].as_value() for name, at in place.items()} for vector in (span.start, span.step)
         )
-        a = {name: Mux(is_second, step[name], begin[name]) for name in place}
+        of_step = is_second if paired is None else is_second | paired
+        a = {name: Mux(of_step, step[name], begin[name]) for name in place}
         b = {name: Mux(begun, step[name], begin[name]) for name in place}
         squares = []
         for number, names in enumerate(p.squares):
@@ -274,7 +293,7 @@ class QuotientSpansUnit(wiring.Component):
         to_start = stream.Signature(payload.shape()).create(path=("to_start",))
         m.d.comb += [
             to_start.valid.eq(here[self._SUMS][2] & moves),
-            to_start.payload.length.eq(delayed(span.length, "length", self._SUMS)),
+            to_start.payload.length.eq(delayed(self._counted(span.length), "length", self._SUMS)),
         ]
         for total, word in zip(
             (*squares, *lines), (*to_start.payload.squares, *to_start.payload.lines), strict=True
@@ -291,127 +310,39 @@ class QuotientSpansUnit(wiring.Component):
         # exponent.
         at_sums, at_coarse = here[self._SUMS], here[self._SUMS + 1]
         before = delayed(span.exponent, "exponent", self._SUMS - 1)
-        exponent = register(before, f"exponent_{self._SUMS}")
-        is_twice = here[self._SUMS - 1][0]
-        amount = register(Mux(is_twice, Cat(Const(0, 1), before), before)[:5], "amount")
-        free = p.square_format.fraction_bits - 34
-        shifted = [
-            self._shift(register, total, free + 1, amount, f"square_{k}") for k, total in enumerate(squares)
-        ]
-        more = p.LINE_FORMAT.fraction_bits - 34
-        shifted += [
-            self._shift(register, total, more, exponent, f"line_{k}") for k, total in enumerate(lines)
-        ]
+        amounts = before, Mux(here[self._SUMS - 1][0], Cat(Const(0, 1), before), before)[:5]
+        if paired is not None:
+            amounts = self._amounts(m, moves & at_coarse[1], delayed, paired, b, amounts)
+        exponent = register(amounts[0], f"exponent_{self._SUMS}")
+        amount = register(amounts[1], "amount")
+        shifted = self._shifted(register, (squares, amount), (lines, exponent))
         # Second differences wait until both differences of the span before are taken.
-        m.d.comb += moves.eq(~((at_coarse[0] & first[1]) | (at_sums[2] & ~to_start.ready)))
+        arrives = at_coarse[0]
+        if paired is not None:
+            # A pair has first differences alone.
+            arrives |= at_coarse[1]
+        m.d.comb += moves.eq(~((arrives & first[1]) | (at_sums[2] & ~to_start.ready)))
         for which, (word, waits) in enumerate((second, first)):
             with m.If(moves & at_coarse[which]):
                 m.d.sync += waits.eq(1)
                 for target, value in zip((*word.squares, *word.lines), shifted, strict=True):
                     m.d.sync += target.eq(value[: len(target)])
 
-    def _set_up_serially(self, m: Module, taken: Any, second, first, start: stream.Interface) -> None:
-        """Products one after the other, their sums, one shift, and the registers in which sums wait.
-
-        A turn begins while no words of its kind are inside, so that nothing behind the multiplier waits.
-        """
-        p, span = self.model, self.i.payload
-        place = {name: index for index, name in enumerate(p.components)}
-        begin, change = (
-            {name: vector[at].as_value() for name, at in place.items()} for vector in (span.start, span.step)
-        )
-        squares = [name for names in p.squares for name in names]
-        factors = self._factors()
-        sizes = [*map(len, p.squares), *[len(factors) // p.lights] * p.lights]
-        lasts = [sum(sizes[: k + 1]) - 1 for k in range(len(sizes))]
-        steps = lasts[-1] + 1
-
-        # The turns are second differences, first differences, the start.
-        kinds = data.StructLayout({"second": 1, "first": 1, "start": 1})
-        note = data.StructLayout({"turn": kinds, "step": range(steps)})
-        busy, made = Signal(kinds, name="busy"), Signal(2, name="made")
-        step, ends = Signal(range(steps), name="step"), Signal(name="ends")
-        is_start = made[1] | ~span.length[1:].any()
-        turn = Cat(~made[0] & ~is_start, made[0] & ~is_start, is_start)
-        may_go = step.any() | ~(busy.as_value() & turn).any()
-        goes = self.i.valid & may_go
-        notes = [Signal(note, name=f"note_{stage}") for stage in range(self._SHIFTED)]
-        m.d.comb += [
-            ends.eq(step == steps - 1),
-            # Spans without a pixel are not valid here. A pipeline drops them before.
-            self.i.ready.eq(Mux(span.length.any(), may_go & ends & is_start, ~self.begun)),
-            self.begun.eq(step.any() | made.any()),
-            notes[0].turn.as_value().eq(Mux(goes, turn, 0)),
-            notes[0].step.eq(step),
-        ]
-        m.d.sync += [after.eq(before) for before, after in itertools.pairwise(notes)]
-        with m.If(goes):
-            m.d.sync += step.eq(Mux(ends, 0, step + 1))
-            with m.If(ends):
-                m.d.sync += made.eq(Mux(is_start, 0, Cat(1, made[0])))
-        multiplied, shifting = notes[2], notes[4]
-
-        def register(value, name):
-            result = Signal(Value.cast(value).shape(), name=name, reset_less=True)
-            m.d.sync += result.eq(value)
-            return result
-
-        left = [Mux(turn[0], change[name], begin[name]) for name in squares]
-        left += [Mux(turn[0], later, factor)[:18] if p.highlights else factor for _, factor, later in factors]
-        right = [Mux(is_start, begin[name], change[name]) for name in (*squares, *(f[0] for f in factors))]
-        a, b = (
-            register(select([word.as_unsigned() for word in words], step).as_signed(), name)
-            for words, name in ((left, "factor"), (right, "component"))
-        )
-        product = register(a * b, "product")
-        total = Signal(signed(len(product) + 2), name="total", reset_less=True)
-        continues = ~Cat(multiplied.step == last + 1 for last in (-1, *lasts[:-1])).any()
-        m.d.sync += total.eq(Mux(continues, total, 0) + product)
-        # The payload stays for the turn of the start, while the last differences are shifted.
-        twice = multiplied.turn.second & (multiplied.step < len(squares))
-        exponent = Mux(multiplied.turn.start, 0, span.exponent)
-        amount = register(Mux(twice, Cat(Const(0, 1), exponent), exponent)[:5], "amount")
-        free, more = p.square_format.fraction_bits - 34, p.LINE_FORMAT.fraction_bits - 34
-        shifted = self._shift(register, total, free + 1, amount, "total")
-
-        words, start_waits = Signal(self._start_shape(), name="start_words"), Signal(name="start_waits")
-        self._few, length = Signal(3, name="few"), span.length
-        m.d.comb += [start.payload.eq(words), start.valid.eq(start_waits)]
-        with m.If(taken[2]):
-            m.d.sync += start_waits.eq(0)
-        with m.If(goes & ends & is_start):
-            m.d.sync += [words.length.eq(length), self._few.eq(self._few_of(length))]
-            if p.takes_heights:
-                m.d.sync += [word.eq(begin[f"z{light}"]) for light, word in enumerate(words.heights)]
-        for kind, (word, waits) in enumerate((second, first, (words, start_waits))):
-            arrives = shifting.turn.as_value()[kind]
-            lows = (0, free + 1 - more) if kind < 2 else (free + 1, free + 1)
-            targets = [(target, lows[0]) for target in word.squares]
-            targets += [(target, lows[1]) for target in word.lines]
-            for last, (target, low) in zip(lasts, targets, strict=True):
-                with m.If(arrives & (shifting.step == last)):
-                    m.d.sync += target.eq(shifted[low : low + len(target)])
-            with m.If(arrives & (shifting.step == steps - 1)):
-                m.d.sync += waits.eq(1)
-            with m.If(taken[kind]):
-                m.d.sync += busy.as_value()[kind].eq(0)
-            with m.If(goes & turn[kind]):
-                m.d.sync += busy.as_value()[kind].eq(1)
-
-    def _factors(self) -> list[tuple[str, Value, Any]]:
-        """For each product of a line: component, factor, and factor in the turn of second differences.
-
-        If z is taken, z times 2^16 comes with the second differences.
-        """
-        p = self.model
-        if not p.highlights:
-            return [(f"z{light}", Const(p.ONE, signed(18)), None) for light in range(p.lights)]
-        pairs = [zip("xz", self.constants[light], (0, 1 << 16), strict=True) for light in range(p.lights)]
+    def _shifted(self, register: Callable, squares: Any, lines: Any) -> list[Value]:
+        """Differences from sums of products and their shifts."""
+        p, ((squares, amount), (lines, exponent)) = self.model, (squares, lines)
+        left, more = p.square_format.fraction_bits - 33, p.LINE_FORMAT.fraction_bits - 34
         return [
-            (f"{axis}{light}", part.as_value(), later)
-            for light, of_light in enumerate(pairs)
-            for axis, part, later in of_light
+            *(self._shift(register, total, left, amount, f"square_{k}") for k, total in enumerate(squares)),
+            *(self._shift(register, total, more, exponent, f"line_{k}") for k, total in enumerate(lines)),
         ]
+
+    def _turn_of_a_pair(self, m: Module, moves: Value, begun: Value, is_second: Value) -> Value | None:
+        """Whether the turn is the second turn of a pair, see `QuotientLanesUnit`. ``None``: no pairs."""
+
+    def _counted(self, length: Value) -> Value:
+        """Number from which the pixels of a span are counted."""
+        return length
 
     @staticmethod
     def _few_of(length: Value) -> Value:

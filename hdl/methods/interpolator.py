@@ -92,6 +92,10 @@ class InterpolatorUnit(wiring.Component):
         Least cycles from a pixel to the next in the products with L and H, for methods that find normals.
     factors : sequence of int
         Indices of the lights that fade, for methods that serve them, see `ShadingPipeline`.
+    lanes : int
+        Pixels of a beat. With several lanes ``o`` has an array of operands, an entry for each lane. They are
+        operands of neighbouring pixels of a span. At the end of a span, entries without a pixel have no
+        meaning.
 
     Members
     -------
@@ -206,6 +210,7 @@ class InterpolatorUnit(wiring.Component):
         length_bits: int = LENGTH_BITS,
         product_interval: int = 1,
         factors: Sequence[int] = (),
+        lanes: int = 1,
     ):
         intervals = self.setup_intervals(model)
         if setup_interval not in (None, *intervals):
@@ -222,10 +227,13 @@ class InterpolatorUnit(wiring.Component):
         self.length_bits = length_bits
         self.product_interval = product_interval
         self.factors = tuple(factors)
+        self.lanes = lanes
         further = {"factors": len(factors)} if factors else {}
         further |= self.span_options(model)
         span = self.span_shape(lights, highlights=highlights, length_bits=length_bits, **further)
         operands = operands_shape(model, lights, highlights=highlights, factored=bool(factors))
+        if lanes > 1:
+            operands = data.ArrayLayout(operands, lanes)
         members = {
             "i": In(stream.Signature(span)),
             "o": Out(stream.Signature(operands)),

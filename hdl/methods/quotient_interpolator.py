@@ -1,16 +1,20 @@
 """The quotient method: N·L and highlights as quotients of quadratics, without a unit normal."""
 
+from types import SimpleNamespace
+
 import numpy as np
-from amaranth.hdl import Module
+from amaranth.hdl import Cat, Module
 from amaranth.lib.wiring import Out
 
 from blysk.golden.cosines.quotient import Quotient
+from blysk.golden.cosines.quotient_lanes import QuotientLanes
 from blysk.golden.cosines.quotient_spans import QuotientSpans
 from blysk.golden.methods.quotient_interpolator import QuotientInterpolator
 from blysk.golden.number.spans import LENGTH_BITS
 from blysk.hdl.core.stream import connect
 from blysk.hdl.core.views import copy
 from blysk.hdl.cosines.quotient import QuotientUnit
+from blysk.hdl.cosines.quotient_lanes import QuotientLanesUnit
 from blysk.hdl.cosines.quotient_spans import QuotientSpansUnit, vectors_shape
 from blysk.hdl.methods.interpolator import InterpolatorUnit, flag_spans
 
@@ -23,6 +27,9 @@ class QuotientInterpolatorUnit(InterpolatorUnit, model=QuotientInterpolator):
     `QuotientSpansUnit` gives the words of the pixels, and `QuotientUnit` their quotients. A span of one pixel
     takes one cycle. A longer span takes at least three cycles. A span is flagged at its first pixel out of
     range.
+
+    With two lanes `QuotientLanesUnit` gives the words of two pixels. Each lane has a `QuotientUnit`. Both
+    have the same handshakes, so they are in the same state on every cycle.
 
     Parameters
     ----------
@@ -74,9 +81,14 @@ class QuotientInterpolatorUnit(InterpolatorUnit, model=QuotientInterpolator):
     def __init__(self, model: QuotientInterpolator, lights: int, **options):
         super().__init__(model, lights, **options)
         spans = model.spans(lights, self.highlights)
-        # If a pixel takes several cycles, one multiplier has enough time for a span.
-        self._spans = QuotientSpansUnit(spans, self.length_bits, serial=self.product_interval > 1)
-        self._quotient = QuotientUnit(Quotient(spans), self.product_interval)
+        if self.lanes > 1:
+            beats = QuotientLanes(spans.lights, spans.highlights, spans.mirror, self.lanes)
+            self._spans = QuotientLanesUnit(beats, self.length_bits)
+        else:
+            # If a pixel takes several cycles, one multiplier has enough time for a span.
+            self._spans = QuotientSpansUnit(spans, self.length_bits, serial=self.product_interval > 1)
+        self._quotients = [QuotientUnit(Quotient(spans), self.product_interval) for _ in range(self.lanes)]
+        self._quotient = self._quotients[0]
         self.setup_interval = self._spans.initiation_interval
         self.cycles_per_pixel = self.product_interval
         self.latency = self._spans.latency + self._quotient.latency
@@ -86,6 +98,8 @@ class QuotientInterpolatorUnit(InterpolatorUnit, model=QuotientInterpolator):
         m = Module()
         m.submodules.quotient_spans = spans = self._spans
         m.submodules.quotient = quotient = self._quotient
+        for lane, further in enumerate(self._quotients[1:], 1):
+            m.submodules[f"quotient_{lane}"] = further
         for name in self.i.payload.shape().members:
             m.d.comb += copy(spans.i.payload[name], self.i.payload[name])
         m.d.comb += [
@@ -96,14 +110,33 @@ class QuotientInterpolatorUnit(InterpolatorUnit, model=QuotientInterpolator):
         if self.highlights:
             for given, light in zip(spans.constants, self.constants, strict=True):
                 m.d.comb += [given[0].eq(light.direction[0]), given[1].eq(light.direction[2])]
-        connect(m, spans.o, quotient.i)
-        result = quotient.o.payload
-        for light, operands in zip(result.lights, self.o.payload, strict=True):
-            for name in light.shape().members:
-                m.d.comb += operands[name].eq(light[name])
+        if self.lanes == 1:
+            connect(m, spans.o, quotient.i)
+            result, results = quotient.o.payload, [self.o.payload]
+        else:
+            result, results = self._connect_lanes(m), self.o.payload
+        for unit, of_lane in zip(self._quotients, results, strict=True):
+            for light, operands in zip(unit.o.payload.lights, of_lane, strict=True):
+                for name in light.shape().members:
+                    m.d.comb += operands[name].eq(light[name])
         m.d.comb += [
             self.o.valid.eq(quotient.o.valid),
             quotient.o.ready.eq(self.o.ready),
             self.out_of_range.eq(flag_spans(m, self.o.valid & self.o.ready, result)),
         ]
         return m
+
+    def _connect_lanes(self, m: Module) -> SimpleNamespace:
+        """Connect the quotient unit of each lane. Returns the marks of a beat, for `flag_spans`."""
+        given, lost = self._spans.o, []
+        for lane, quotient in enumerate(self._quotients):
+            m.d.comb += [
+                copy(quotient.i.payload, given.payload[lane]),
+                quotient.i.valid.eq(given.valid),
+                quotient.o.ready.eq(self.o.ready),
+            ]
+            marks = quotient.o.payload
+            # In further lanes the bit tells whether there is a pixel.
+            lost.append(marks.out_of_range & (marks.span if lane else 1))
+        m.d.comb += given.ready.eq(self._quotient.i.ready)
+        return SimpleNamespace(out_of_range=Cat(lost).any(), span=self._quotient.o.payload.span)

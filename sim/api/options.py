@@ -5,7 +5,7 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any, Literal, NamedTuple, TypedDict, Union, get_args
 
 from blysk.golden.albedo.albedo import Albedo
-from blysk.golden.build import PIPES, PORTS, SETUPS, STREAMS, STYLES, TOPS, Style
+from blysk.golden.build import LANES, PIPES, PORTS, SETUPS, STREAMS, STYLES, TOPS, Style
 from blysk.golden.frame_constants import MAX_MATERIALS
 from blysk.golden.lighting.intensity import MAX_LIGHTS
 from blysk.golden.lighting.specular import MAX_EXPONENT
@@ -317,6 +317,13 @@ BUILD: dict[str, Option] = {
         "Where triangles become spans: in software, or in the geometry RTL, which also tests depths.",
         "pipeline.geometry",
     ),
+    "lanes": Option(
+        Few(*LANES),
+        1,
+        "Number of lanes of the pipeline: pixels of a span in a beat. Needs the method quotient and the "
+        "throughput style.",
+        "pipeline.lanes",
+    ),
     "pipes": Option(
         Few(*PIPES),
         1,
@@ -359,7 +366,7 @@ BUILD: dict[str, Option] = {
 """Options of a core's Verilog. `design.built` turns them into fields of `Build`."""
 
 RENDERING: dict[str, Option] = {
-    **{name: BUILD[name] for name in ("geometry", "pipes", "setups")},
+    **{name: BUILD[name] for name in ("geometry", "lanes", "pipes", "setups")},
     # The size of the depth test is the picture's size, which is an option of the scene.
     "coarse": Option(
         Truth(),
@@ -427,6 +434,7 @@ class SharedOptions(TypedDict, total=False):
     """Options of `BUILD` that `RENDERING` has with the same type, by their names in Python."""
 
     geometry: Literal["software", "hardware"]
+    lanes: Literal[1, 2]
     pipes: Literal[1, 2, 4, 8]
     setups: Literal[1, 2]
 

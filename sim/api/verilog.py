@@ -18,7 +18,7 @@ from blysk.hdl.emit.verilog import check_name, emit
 from blysk.hdl.geometry.geometry import GeometryUnit
 from blysk.hdl.pipeline import ShadingPipelineUnit
 from blysk.hdl.pixel_pipelines import MergedPipelinesUnit, PixelPipelinesUnit, port_descriptions
-from blysk.hdl.port_descriptions import PORT_DESCRIPTIONS
+from blysk.hdl.port_descriptions import LANE_DESCRIPTIONS, PORT_DESCRIPTIONS
 from blysk.hdl.render import RendererUnit
 from blysk.sim.api.bus_verilog import bus_descriptions, bus_header, triangle_descriptions
 from blysk.sim.api.design import built
@@ -51,14 +51,16 @@ def header_of(unit: ShadingUnit, by_triangles: bool = False) -> list[str]:
     several = model if isinstance(model, PixelPipelines) else None
     made = model.design if isinstance(model, PixelPipelines) else model
     gate = ", highlight gate" if made.gate else ""
+    beat, count = ("pixel", "length") if made.build.lanes == 1 else ("beat", "beats")
     lines = [
         f"blysk {version('blysk')} shading pipeline, MIT licence",
         f"method {made.method}, model {made.model}, lights {made.lights}, materials {made.materials}, "
         f"{made.build.style} style{gate}",
         f"transfer {made.transfer}: pixels are codes of {SPACES[made.transfer]}",
-        f"latency {unit.latency} cycles, {unit.cycles_per_pixel} a pixel",
-        f"a span takes at most max({unit.cycles_per_pixel} length, {unit.setup_interval}) cycles",
+        f"latency {unit.latency} cycles, {unit.cycles_per_pixel} a {beat}",
+        f"a span takes at most max({unit.cycles_per_pixel} {count}, {unit.setup_interval}) cycles",
         *_several_lines(several, unit),
+        *_lane_lines(made),
         _FORMATS,
     ]
     if made.lights:
@@ -112,6 +114,17 @@ def _several_lines(several: PixelPipelines | None, unit: ShadingUnit) -> list[st
     )
     return [
         f"{several.pipes} pipelines; pipeline k shades scanlines with y mod {several.pipes} = k; {streams}"
+    ]
+
+
+def _lane_lines(design: ShadingPipeline) -> list[str]:
+    """Description of several lanes, in lines."""
+    lanes = design.build.lanes
+    if lanes == 1:
+        return []
+    return [
+        f"{lanes} lanes: a beat of o has the next {lanes} pixels of a span, from its first pixel on; "
+        "the last beat has the rest"
     ]
 
 
@@ -204,6 +217,9 @@ def _descriptions(unit: ShadingUnit | RendererUnit) -> Mapping[str, str]:
     if "attributes" in members:
         ports |= {f"i_attributes_{field}" for field in members["attributes"].members}
     texts = port_descriptions(unit.model.pipes) if isinstance(unit, PixelPipelinesUnit) else PORT_DESCRIPTIONS
+    if isinstance(unit, ShadingPipelineUnit) and unit.model.build.lanes > 1:
+        single = {port for port in texts if port.startswith("o_")}
+        texts = {port: text for port, text in texts.items() if port not in single} | LANE_DESCRIPTIONS
     return {
         port: text for port, text in texts.items() if not port.startswith(("i_", "texel_")) or port in ports
     }

@@ -46,6 +46,7 @@ def frame_figures(
     visible = int(np.count_nonzero(frame.cut_raster.visible))
     return {
         **_figures(scene, design, frame, raster.triangles, visible),
+        "lanes": design.build.lanes,
         "pipes": design.build.pipes,
         **_errors(comparison, ERRORS),
         "counts": {
@@ -179,7 +180,7 @@ def animation_figures(frames: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
     """
     same = ("method", "model", "exponent", "roughness", "lights", "materials", "style", "gate", "engine")
     same += ("width", "height", "target", "transfer", "border", "step_lsb")
-    same += tuple(key for key in ("pipes", "geometry", "setups", "coarse") if key in frames[0])
+    same += tuple(key for key in ("lanes", "pipes", "geometry", "setups", "coarse") if key in frames[0])
     pixels, cycles = (sum(frame[key] for frame in frames) for key in ("pixels", "cycles"))
     bounds = [frame["bound_lsb"] for frame in frames]
     return {

@@ -129,6 +129,19 @@ def _in_order(beats: np.ndarray, y: np.ndarray) -> np.ndarray:
     return ordered
 
 
+def _single_pixels(beats: np.ndarray) -> np.ndarray:
+    """Pixels of beats of a pipeline with several lanes, in their order."""
+    lanes = beats["colors"].shape[1]
+    lane = np.arange(lanes)
+    present = (beats["present"][:, np.newaxis] >> lane & 1).astype(bool)
+    fields = [(name, np.int64) for name in ("x", "y")] + [(name, np.uint8) for name in "rgb"]
+    pixels = np.zeros(present.shape, dtype=fields)
+    pixels["x"], pixels["y"] = beats["x"][:, np.newaxis] + lane, beats["y"][:, np.newaxis]
+    for name in "rgb":
+        pixels[name] = beats["colors"][name]
+    return pixels[present]
+
+
 class FrameSimulator:
     """Simulator of one or several pipelines. It is built once, and renders any number of frames.
 
@@ -159,7 +172,7 @@ class FrameSimulator:
         start = perf_counter()
         self.design = design
         self.engine = engine
-        self._pipes = design.build.pipes
+        self._pipes, self._lanes = design.build.pipes, design.build.lanes
         self._unit = _unit_of(design)
         spans, constants = _sample(design)
         expected = design.compute(spans, constants)
@@ -175,7 +188,9 @@ class FrameSimulator:
     ) -> tuple[Run, np.ndarray]:
         """A simulation, and its pixels in the order of the spans. ``y`` has the pixels' scanlines."""
         # The number of wide beats depends on the number of pixels that leave on each cycle.
-        ends = {"count": len(y)} if self._pipes == 1 else {"count": None, "idle_timeout": _IDLE}
+        spans = self.design.interpolator.sent(spans)
+        beats = int((-(-np.asarray(spans.length) // self._lanes)).sum())
+        ends = {"count": beats} if self._pipes == 1 else {"count": None, "idle_timeout": _IDLE}
         run = simulate(
             self._unit,
             beats_of(self._unit, spans),
@@ -185,6 +200,8 @@ class FrameSimulator:
             **ends,
             **options,
         )
+        if self._lanes > 1:
+            return run, _single_pixels(run.beats)
         return run, run.beats if self._pipes == 1 else _in_order(run.beats, y)
 
     def render(
@@ -215,8 +232,8 @@ class FrameSimulator:
         prepared = prepare(scene, self.design)
         rastered = perf_counter()
         raster = prepared.cut_raster
-        count = len(raster.span)
-        report = None if progress is None else lambda done: progress(min(done * self._pipes, count), count)
+        count, at_once = len(raster.span), self._pipes * self._lanes
+        report = None if progress is None else lambda done: progress(min(done * at_once, count), count)
         y = raster.pixel // scene.width
         run, beats = self._run(prepared.spans, prepared.constants, y, progress=report, vcd=vcd)
         assert run.status is not None

@@ -54,6 +54,12 @@ _WARNINGS = (
 """Counts that may show a fault of the mesh or the design."""
 
 
+def _at_once(figures: Mapping[str, Any]) -> str:
+    """Words for several lanes or pipelines."""
+    counts = ((figures.get(name, 1), word) for name, word in (("lanes", "lanes"), ("pipes", "pipelines")))
+    return "".join(f", {count} {word}" for count, word in counts if count > 1)
+
+
 def _line(name: str, text: str) -> str:
     return f"{name:<12}{text}"
 
@@ -100,7 +106,7 @@ def short_lines(figures: Mapping[str, Any]) -> Iterator[str]:
         f"{figures['mesh']}, {_triangles(figures)}, {figures['width']}x{figures['height']}",
     )
     lights = f"{figures['lights']} light{'s' * (figures['lights'] != 1)}"
-    pipes = f", {figures['pipes']} pipelines" if figures.get("pipes", 1) > 1 else ""
+    pipes = _at_once(figures)
     model = f"{figures['method']}, {_model(figures)}, {lights}{pipes}"
     geometry = "geometry, " if "geometry" in figures else ""
     yield _line("hardware", f"{geometry}{model}; {figures['engine']}")
@@ -173,7 +179,7 @@ def specialisation_lines(figures: Mapping[str, Any]) -> Iterator[str]:
 def _pixel_lines(figures: Mapping[str, Any]) -> Iterator[str]:
     yield _line("pixels", f"{figures['pixels']:,} shaded, {figures['visible_pixels']:,} visible")
     rate = f", {figures['cycles_per_pixel']:.3f} a pixel" if figures["pixels"] else ""
-    pipes = f", {figures['pipes']} pipelines" if figures.get("pipes", 1) > 1 else ""
+    pipes = _at_once(figures)
     yield _line("cycles", f"{figures['cycles']:,}{rate}{pipes}")
 
 

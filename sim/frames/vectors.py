@@ -9,6 +9,7 @@ import numpy as np
 
 from blysk.golden.bus.registers import CONSTANTS, RegisterMap
 from blysk.golden.bus.stream_width import split
+from blysk.golden.cosines.quotient_lanes import pixels_of_beats
 from blysk.golden.frame_constants import FrameConstants, writes_of
 from blysk.golden.frames.prepare import prepare
 from blysk.golden.frames.triangle_frame import sent_triangles, triangle_constants
@@ -139,6 +140,7 @@ def teapot_frame(
     spans = prepared.spans
     spans = spans[np.r_[0, : len(spans)]]
     spans.length[0] = 0
+    spans = design.interpolator.sent(spans)
     return spans, prepared.constants, design.compute(spans, prepared.constants)
 
 
@@ -160,10 +162,32 @@ def _colored(
     return mesh, materials
 
 
-def pixel_beats(pixels: Pixels) -> dict[str, np.ndarray]:
-    """Output beats of a pipeline, as `pack` takes them."""
-    beats = {"x": pixels.x, "y": pixels.y, "last": pixels.last}
-    return beats | dict(zip("rgb", pixels.color.T, strict=True))
+def pixel_beats(pixels: Pixels, lanes: int = 1) -> dict[str, np.ndarray]:
+    """Output beats of a pipeline, as `pack` takes them.
+
+    Parameters
+    ----------
+    pixels : Pixels
+        All pixels of its spans.
+    lanes : int
+        Lanes of the pipeline. With several lanes the beats have the fields of `beat_shape`.
+    """
+    if lanes == 1:
+        beats = {"x": pixels.x, "y": pixels.y, "last": pixels.last}
+        return beats | dict(zip("rgb", pixels.color.T, strict=True))
+    length = np.diff(np.flatnonzero(np.r_[True, pixels.last]))
+    index, present, _ = pixels_of_beats(length, lanes)
+    colors = np.zeros(present.shape, [(name, np.uint8) for name in "rgb"])
+    for name, channel in zip("rgb", pixels.color.T, strict=True):
+        colors[name] = np.where(present, channel[index], 0)
+    last = index[np.arange(len(index)), present.sum(axis=1) - 1]
+    return {
+        "x": pixels.x[index[:, 0]],
+        "y": pixels.y[index[:, 0]],
+        "present": (present << np.arange(lanes)).sum(axis=1),
+        "colors": colors,
+        "last": pixels.last[last],
+    }
 
 
 def vectors(design: ShadingPipeline, unit: Any) -> dict[str, Table]:
@@ -210,7 +234,7 @@ def _span_frame(design: ShadingPipeline, core: Any) -> _Frame:
     spans, constants, pixels = teapot_frame(design)
     status = {"out_of_range_spans": pixels.out_of_range_spans, "empty_spans": 1, "overrun": 0}
     lanes: list[dict[str, np.ndarray]] = []
-    made = pixel_beats(pixels)
+    made = pixel_beats(pixels, design.build.lanes)
     if isinstance(core, PixelPipelinesUnit):
         lanes = [pixel_beats(each) for each in core.model.compute_each(spans, constants)]
     return _Frame(beats_of(core, spans), made, writes_of(constants), {}, status, lanes)

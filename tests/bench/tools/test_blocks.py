@@ -25,7 +25,7 @@ FEW = 4000
 PARTS = {
     "FrameConstantsUnit": "registers behind a write port",
     "PixelAssemblerUnit": "joins two streams",
-    "PixelLanesUnit": "a register of the pixels of several pipelines",
+    "PixelJoinerUnit": "a register of the pixels of several pipelines",
     "PixelMergerUnit": "in the pixel pipelines, takes turns",
     "PixelPipelinesUnit": "the same without the merger, which gives the streams a record needs",
     "WidePipelinesUnit": "the same with wide beats, whose order depends on the cycles",

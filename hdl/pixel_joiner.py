@@ -1,4 +1,4 @@
-"""Pixel lanes: the pixels that several pipelines give on one cycle, as one wide beat."""
+"""Pixel joiner: the pixels that several pipelines give on one cycle, as one wide beat."""
 
 from amaranth.hdl import Cat, Module, Signal, unsigned
 from amaranth.lib import data, stream, wiring
@@ -7,16 +7,16 @@ from amaranth.lib.wiring import In, Out
 from blysk.hdl.core.stream import skid_buffer
 from blysk.hdl.pixel_assembler import pixel_shape
 
-__all__ = ["PixelLanesUnit", "lanes_shape"]
+__all__ = ["PixelJoinerUnit", "joined_shape"]
 
 
-def lanes_shape(pipes: int, x_bits: int = 12, y_bits: int = 12) -> data.StructLayout:
-    """Shape of a wide beat: a pixel for each lane, and in ``present`` a bit for each lane with a pixel.
+def joined_shape(pipes: int, x_bits: int = 12, y_bits: int = 12) -> data.StructLayout:
+    """Shape of a wide beat: a pixel for each pipeline, and in ``present`` a bit for each of these pixels.
 
     Parameters
     ----------
     pipes : int
-        Number of lanes.
+        Number of pipelines.
     x_bits, y_bits : int
         Bits of the coordinates.
     """
@@ -24,17 +24,17 @@ def lanes_shape(pipes: int, x_bits: int = 12, y_bits: int = 12) -> data.StructLa
     return data.StructLayout({"present": unsigned(pipes), "pixels": pixels})
 
 
-class PixelLanesUnit(wiring.Component):
-    """Joins several streams of pixels into wide beats, with at most one pixel for each lane.
+class PixelJoinerUnit(wiring.Component):
+    """Joins several streams of pixels into wide beats, with at most one pixel of each stream.
 
-    A pixel leaves 1 cycle after it was accepted. Without stalls every lane accepts a pixel on every cycle,
-    and no lane waits for another. The payload of a lane without a pixel has no meaning. The unit has no
-    multipliers.
+    A pixel leaves 1 cycle after it was accepted. Without stalls a pixel of every stream is accepted on every
+    cycle, and no stream waits for another. The payload in place of a missing pixel has no meaning. The unit
+    has no multipliers. For the beats of a pipeline with several lanes see `PixelAssemblerUnit`.
 
     Parameters
     ----------
     pipes : int
-        Number of lanes.
+        Number of streams.
     x_bits, y_bits : int
         Bits of the coordinates.
 
@@ -42,7 +42,7 @@ class PixelLanesUnit(wiring.Component):
     -------
     i : :py:`In(stream.Signature(pixel_shape(x_bits, y_bits))).array(pipes)`
         Pixels.
-    o : :py:`Out(stream.Signature(lanes_shape(pipes, x_bits, y_bits)))`
+    o : :py:`Out(stream.Signature(joined_shape(pipes, x_bits, y_bits)))`
         Beats of one pixel or more.
 
     Source: docs/theory/units.md#pipeline.
@@ -54,7 +54,7 @@ class PixelLanesUnit(wiring.Component):
         super().__init__(
             {
                 "i": In(stream.Signature(pixel_shape(x_bits, y_bits))).array(pipes),
-                "o": Out(stream.Signature(lanes_shape(pipes, x_bits, y_bits))),
+                "o": Out(stream.Signature(joined_shape(pipes, x_bits, y_bits))),
             }
         )
 

@@ -1,0 +1,95 @@
+"""Record of the spans of the quotient method with several lanes."""
+
+from functools import partial
+
+import numpy as np
+
+from blysk.bench.units.cosines.quotient_spans import any_vectors, line_directions
+from blysk.bench.units.operands import short_lengths, word_ends
+from blysk.bench.units.record import Case, Record, Stimulus, Variant
+from blysk.golden.cosines.quotient_lanes import QuotientLanes
+from blysk.golden.cosines.quotient_spans import QuotientSpans, SpanVectors
+from blysk.hdl.cosines.quotient_lanes import QuotientLanesUnit
+from blysk.sim.engines.beats import dtype_of
+
+__all__ = ["RECORD", "vectors_with_pairs"]
+
+
+def vectors_with_pairs(rng: np.random.Generator, model: QuotientSpans, length: np.ndarray) -> SpanVectors:
+    """Vectors as of `any_vectors`, in which a span of two pixels is a pair with an exponent of any value."""
+    vectors, pair = any_vectors(rng, model, length), length == 2
+    second = any_vectors(rng, model, np.ones(np.count_nonzero(pair), dtype=np.int64))
+    vectors.step[pair] = second.start
+    vectors.exponent[pair] = rng.integers(0, 16, len(second.start))
+    return vectors
+
+
+def _expect(unit, case):
+    beats = case.beats
+    vectors = SpanVectors(beats["start"], beats["step"], beats["exponent"])
+    pixels = unit.model.compute(vectors, beats["length"], case.constants)
+    words, present, span = unit.model.beats(pixels, beats["length"])
+    found = np.zeros(len(span), dtype_of(unit.o.payload.shape()))
+    found["rest"], found["line"] = words.rest.codes, words.line.codes
+    found["span"] = np.where(np.arange(present.shape[1]), present, 1 - span[:, np.newaxis] % 2)
+    if "numerator" in found.dtype.names:
+        found["numerator"] = words.numerator.codes
+    if "away" in found.dtype.names:
+        found["away"] = (words.away << np.arange(words.away.shape[2])).sum(axis=2)
+    return found
+
+
+def _case(unit, vectors, length, constants):
+    beats = {**vectors._asdict(), "length": length}
+    return Case(beats, constants if unit.model.highlights else None)
+
+
+def _spans(unit, rng, count):
+    """Spans, most of them short, and many of them pairs."""
+    length = np.maximum(short_lengths(rng, count, 1) % (1 << unit.length_bits), 1)
+    length = np.where(rng.random(len(length)) < 0.2, 2, length)
+    vectors = vectors_with_pairs(rng, unit.model, length)
+    return _case(unit, vectors, length, line_directions(rng, unit.model.lights))
+
+
+def _words(unit, rng, count):
+    """Extreme codes in every component and light, with any steps and exponents. Sums wrap."""
+    length = np.maximum(rng.choice([1, 1, 1, 2, 3, 4, 5, 6, 7, 9, 40], count) % (1 << unit.length_bits), 1)
+    shape = count, len(unit.model.components)
+    start, step = (np.maximum(word_ends(rng, *shape), 1 - (1 << 17)) for _ in range(2))
+    vectors = SpanVectors(start, step, rng.integers(0, 16, count))
+    return _case(unit, vectors, length, word_ends(rng, unit.model.lights, 2))
+
+
+def _long_spans(unit, rng, count):
+    """Spans of 3000 to 4095 pixels, where the last bits of differences change the words."""
+    length = np.maximum(rng.integers(3000, 4096, 8) % (1 << unit.length_bits), 1)
+    vectors = vectors_with_pairs(rng, unit.model, length)
+    return _case(unit, vectors, length, line_directions(rng, unit.model.lights))
+
+
+RECORD = Record(
+    name="quotient_lanes",
+    title="Squares and linear functions of N/W along spans, two pixels a cycle",
+    source="docs/theory/quotient.md#lanes",
+    variants={
+        "N.H": Variant(partial(QuotientLanesUnit, QuotientLanes()), beat={"length": 64}),
+        "R.V": Variant(partial(QuotientLanesUnit, QuotientLanes(mirror=True)), long=True),
+        "2 lights": Variant(partial(QuotientLanesUnit, QuotientLanes(2), 9), long=True),
+        "2 lights, no highlights": Variant(
+            partial(QuotientLanesUnit, QuotientLanes(2, highlights=False)), long=True
+        ),
+    },
+    expect=_expect,
+    stimuli={
+        "spans": Stimulus(_spans, 3000),
+        "words": Stimulus(_words, 500, repeats=4),
+        "long spans": Stimulus(_long_spans, stalled=False),
+    },
+    axis="",
+    still={
+        "the second difference of w is positive and less than 2": "second[97] change_1[48]",
+        "the second difference of z is a multiple of 8": "second[98-100]",
+        "cos a is not negative": "line_z0_b[17]",
+    },
+)

@@ -1,0 +1,207 @@
+# amaranth: UnusedElaboratable=no
+"""Proofs about spans of the quotient method with two lanes: each beat has the words of its own span.
+
+Words have few bits, and the multipliers compute true products, as in the proofs of `QuotientSpansUnit`.
+"""
+
+from dataclasses import dataclass
+
+import pytest
+from amaranth.hdl import Cat, Const, Module, Mux, Signal, Value, signed
+from amaranth.lib import data, stream, wiring
+from amaranth.lib.wiring import In, Out
+
+from blysk.golden.cosines.quotient_lanes import QuotientLanes
+from blysk.golden.number.fixed import SQ
+from blysk.hdl.cosines.quotient_lanes import QuotientLanesUnit, lane_words_shape
+
+from .prover import Harness
+from .rules import answers, pixels_follow, stays, taken
+from .test_quotient_spans import BITS, CYCLES, DEPTH, hold_payload, words_of
+
+pytestmark = pytest.mark.prove
+
+LENGTH_BITS = 3
+"""Bits of lengths. The longest span has four beats."""
+
+LONGEST = 4
+"""Largest number of beats of a span."""
+
+
+@dataclass(frozen=True)
+class FewBits(QuotientLanes):
+    """Formats for words of few bits, as in the proofs of `QuotientSpansUnit`."""
+
+    @property
+    def square_format(self):
+        """The format of squares has 12 bits."""
+        return SQ(-24, 35)
+
+
+class ShortSpansUnit(wiring.Component):
+    """The unit with x and z of `BITS` bits, y = 0, exponents 0 and 1, ``l = x + z``, and room for few
+    starts."""
+
+    def __init__(self):
+        self.model = FewBits()
+        vector = data.StructLayout({"x": signed(BITS), "z": signed(BITS)})
+        span = {"start": vector, "step": vector, "exponent": 1, "length": LENGTH_BITS}
+        super().__init__(
+            {
+                "i": In(stream.Signature(data.StructLayout(span))),
+                "o": Out(stream.Signature(lane_words_shape(self.model))),
+            }
+        )
+
+    def elaborate(self, platform):
+        m = Module()
+        m.submodules.spans = self.spans = spans = QuotientLanesUnit(self.model, LENGTH_BITS)
+        spans.DEPTH = DEPTH
+        given, payload = self.i.payload, spans.i.payload
+        for name in ("start", "step"):
+            for place, axis in ((0, "x"), (2, "z")):
+                m.d.comb += payload[name][place].as_value().eq(given[name][axis])
+        m.d.comb += [
+            payload.exponent.eq(given.exponent),
+            payload.length.eq(given.length),
+            spans.i.valid.eq(self.i.valid),
+            self.i.ready.eq(spans.i.ready),
+            *(part.as_value().eq(1) for part in spans.constants[0]),
+            self.o.payload.eq(spans.o.payload),
+            self.o.valid.eq(spans.o.valid),
+            spans.o.ready.eq(self.o.ready),
+        ]
+        return m
+
+
+class Single:
+    """The second pixel of a pair, as a span of one pixel."""
+
+    def __init__(self, span):
+        self.start, self.step, self.exponent = span.step, span.step, span.exponent
+
+
+def of_spans(*, multiplies=False, shortest=1, longest=6):
+    """A harness for spans of one to three beats. An offered span stays until it is accepted."""
+    h = Harness(unit := ShortSpansUnit(), multiplies=multiplies)
+    length = unit.i.payload.length
+    h.assume((length >= shortest) & (length <= longest))
+    hold_payload(h)
+    return h
+
+
+def beats_of(span):
+    """Number of beats of a span."""
+    return (span.length + 1)[1 : LENGTH_BITS + 1]
+
+
+def words_in(lane, words):
+    """Whether a lane has the words m, w, l and z of a pixel."""
+    m, w, line, z = words
+    found = (lane.numerator[0], m), (lane.rest, w), (lane.line[0], line)
+    return Cat(
+        *(Value.cast(word).as_signed() == exact for word, exact in found), lane.away[0] == (z < 0)
+    ).all()
+
+
+def of_words():
+    """Claim that each beat of spans of one to four pixels has the words of this span alone.
+
+    The claim includes the bit of the span, and the lane without a pixel.
+    """
+    h = of_spans(multiplies=True, longest=4)
+    unit, before = h.unit, Signal()
+    with h.m.If(taken(unit.o)):
+        h.m.d.sync += before.eq(unit.o.payload[0].span)
+
+    def right(span, place, last, beat):
+        first, second = beat[0], beat[1]
+        both = ~last | ~span.length[0]
+        # Places of pixels are 0 to 3.
+        pixel = Cat(Const(0, 1), place[0]), Cat(Const(1, 1), place[0])
+        further = words_in(second, words_of(span, pixel[1]))
+        of_pair = words_in(second, words_of(Single(span), Const(0, 2)))
+        return Cat(
+            words_in(first, words_of(span, pixel[0])),
+            (first.span != before) == (place == 0),
+            second.span == both,
+            Mux(both, Mux(span.length == 2, of_pair, further), ~Value.cast(second).any()),
+        ).all()
+
+    pixels_follow(h, unit.i, unit.o, beats_of(unit.i.payload), unit.spans.spans_inside * 2, right)
+    return h
+
+
+def of_progress():
+    """Claim that beats leave while the output is ready, at most as many cycles apart as the latency."""
+    h = of_spans()
+    unit = h.unit
+    owed = pixels_follow(h, unit.i, unit.o, beats_of(unit.i.payload), unit.spans.spans_inside * 3)
+    answers(h, owed.any(), taken(unit.o), unit.spans.latency, unit.o.ready)
+    return h
+
+
+def test_words(prove):
+    """Within `CYCLES`, for spans of 1 to 4 pixels: each beat leaves once and in order, with its span's
+    words."""
+    prove(of_words(), CYCLES)
+
+
+def test_progress(prove):
+    """Within `CYCLES`: beats leave without a pause longer than the latency."""
+    prove(of_progress(), CYCLES)
+
+
+def test_stability_and_admission(prove):
+    """By induction: a beat that waits does not change, and a ready output accepts a span within 14 cycles."""
+    h = of_spans()
+    stays(h, h.unit.o)
+    answers(h, h.unit.i.valid, h.unit.i.ready, 14, h.unit.o.ready)
+    prove(h)
+
+
+BUGS = {
+    "a start does not wait for its differences": (
+        "_take",
+        "last & (self._ready | ~takes_differences)",
+        "last",
+    ),
+    "a pair takes the second differences of the next span": (
+        "_take",
+        "(starts & ~self._starts_pair)",
+        "starts",
+    ),
+    "first differences wait for no second differences": (
+        "_take",
+        " & (has_second | self._marks[0])",
+        "",
+    ),
+    "the gap of the last beat is lost": (
+        "_accumulate",
+        "with m.If(halves):\n                m.d.sync += gap_change",
+        "with m.If(takes_second):\n                m.d.sync += gap_change",
+    ),
+}
+
+
+@pytest.mark.parametrize("bug", BUGS)
+def test_bugs_are_found(refute, inject, bug):
+    """Each bug, injected in the unit, refutes a claim on words."""
+    inject(QuotientLanesUnit, *BUGS[bug])
+    refute(of_words(), CYCLES + 4)
+
+
+def of_waiting():
+    """Claim that first and second differences do not change while they wait."""
+    h = Harness(QuotientLanesUnit(length_bits=LENGTH_BITS))
+    for name, word in (("second", "second"), ("first", "first"), ("first", "marks")):
+        waits, value = h.register(f"{name}_waits"), Value.cast(h.register(word))
+        waited, before = Signal(), Signal(len(value))
+        h.m.d.sync += [waited.eq(waits), before.eq(value)]
+        h.claim(~(waited & waits) | (value == before))
+    return h
+
+
+def test_differences_that_wait_stay(prove):
+    """By induction, for the whole unit: no differences are overwritten before they are taken."""
+    prove(of_waiting())
