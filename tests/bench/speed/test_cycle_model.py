@@ -35,3 +35,11 @@ def test_recurrence(count, waiting):
 def test_frames(method, share):
     simulated, modelled = compare(preset(method, model_of(method)), 400, (64, 48))
     assert abs(modelled - simulated) <= share * simulated
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("triangles", [400, 20_000])
+def test_frames_of_two_lanes(triangles):
+    """The recurrence of two lanes, for long and for short spans."""
+    simulated, modelled = compare(preset().built(lanes=2), triangles, (160, 120))
+    assert abs(modelled - simulated) <= 0.002 * simulated

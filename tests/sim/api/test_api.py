@@ -217,6 +217,18 @@ def test_several_pipelines_give_the_same_picture():
     assert any(line.endswith(", 2 pipelines") for line in two.lines())
 
 
+@pytest.mark.long
+def test_two_lanes_give_the_same_picture():
+    """Two lanes take fewer cycles, and the figures name their number."""
+    options = {"size": (64, 48), "triangles": 400}
+    one, two = (blysk.render("teapot", lanes=lanes, **options) for lanes in (1, 2))
+    np.testing.assert_array_equal(two.image, one.image)
+    assert one.pixels == two.pixels
+    assert two.cycles < 0.8 * one.cycles
+    assert (one.figures["lanes"], two.figures["lanes"]) == (1, 2)
+    assert any(line.endswith(", 2 lanes") for line in two.lines())
+
+
 SCENE_OF_ITS_OWN = blysk.scene(**TINY)
 
 
