@@ -45,9 +45,9 @@ def _case(unit, vectors, length, constants):
 
 
 def _spans(unit, rng, count):
-    """Spans, most of them short, and many of them pairs."""
+    """Spans, most of them short, and many of them pairs. Then 60 spans of one pixel fill the memory."""
     length = np.maximum(short_lengths(rng, count, 1) % (1 << unit.length_bits), 1)
-    length = np.where(rng.random(len(length)) < 0.2, 2, length)
+    length = np.r_[np.where(rng.random(len(length)) < 0.2, 2, length), np.ones(60, dtype=np.int64)]
     vectors = vectors_with_pairs(rng, unit.model, length)
     return _case(unit, vectors, length, line_directions(rng, unit.model.lights))
 
@@ -91,5 +91,6 @@ RECORD = Record(
         "the second difference of w is positive and less than 2": "second[97] change_1[48]",
         "the second difference of z is a multiple of 8": "second[98-100]",
         "cos a is not negative": "line_z0_b[17]",
+        "words of the first lane change by twice a step": "line_0[0] line_0_of_0[0] height_0[0]",
     },
 )
