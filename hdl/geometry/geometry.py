@@ -180,7 +180,7 @@ class GeometryUnit(wiring.Component):
       that the sort drops takes a cycle (`VertexSortUnit`), or 5 to 15 in the compact style
       (`SerialVertexSortUnit`);
     - in the walk `row_cycles` for each scanline without pixels in the picture: 1, or the number of attributes
-      in the compact style;
+      in the compact style. In the throughput style a triangle takes one more cycle there;
     - for a span or piece of p pixels as many cycles as ``p - 1`` has bits. The least is 1 cycle for 1 pixel,
       2 cycles for 2 pixels and 3 cycles for more. With ``lines`` or ``vectors`` the least is 1 cycle for any
       number of pixels. A span never takes more cycles than it has pixels. If n pixels are cut off at the long
@@ -340,7 +340,6 @@ class GeometryUnit(wiring.Component):
         Returns the scanlines as the attributes take them.
         """
         rows, to = self._clip.o, self._attributes.i
-        first, ends = Signal(name="first", init=1), 1
         if self.compact:
             clipped, rows = rows, _between("row", rows)
             full, row = Signal(name="row_full"), Signal.like(clipped.payload, name="row", reset_less=True)
@@ -348,20 +347,27 @@ class GeometryUnit(wiring.Component):
             m.d.comb += clipped.ready.eq(free)
             with m.If(free):
                 m.d.sync += [full.eq(clipped.valid), row.eq(clipped.payload)]
-        with m.If(rows.valid & rows.ready):
-            m.d.sync += first.eq(rows.payload.last)
-        if self.compact:
+            first = Signal(name="first", init=1)
+            with m.If(rows.valid & rows.ready):
+                m.d.sync += first.eq(rows.payload.last)
             count = attribute_count(self._surface)
             lane = Signal(range(count), name="lane")
             with m.If(to.valid & to.ready):
                 m.d.sync += lane.eq(next_turn(lane, count))
-            ends = lane == count - 1
-        m.d.comb += [
-            copy(to.payload.planes, planes.payload),
-            to.valid.eq(rows.valid & (planes.valid | ~first)),
-            rows.ready.eq(to.ready & (planes.valid | ~first) & ends),
-            planes.ready.eq(to.ready & rows.valid & first),
-        ]
+            m.d.comb += [
+                copy(to.payload.planes, planes.payload),
+                to.valid.eq(rows.valid & (planes.valid | ~first)),
+                rows.ready.eq(to.ready & (planes.valid | ~first) & (lane == count - 1)),
+                planes.ready.eq(to.ready & rows.valid & first),
+            ]
+        else:
+            # The planes leave a cycle before the scanline, so that their place is free for the next planes.
+            m.d.comb += [
+                copy(to.payload.planes, planes.payload),
+                to.valid.eq(rows.valid & (planes.valid | ~self._attributes.due)),
+                rows.ready.eq(to.ready),
+                planes.ready.eq(self._attributes.reads),
+            ]
         if self._placements is None:
             m.d.comb += copy(to.payload.row, rows.payload)
         else:

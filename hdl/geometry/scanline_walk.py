@@ -22,6 +22,10 @@ class AttributeTurns:
     In the serial form the first attribute decides for all attributes whether a scanline comes in. The control
     of the walk moves on with the last attribute, `ends`. If ``ahead`` is set, registers tell whether the walk
     advances.
+
+    In the other form `due` is high until a triangle's planes are read, and `reads` on the cycle on which
+    registers take these planes. The triangle's first scanline comes in later. In the serial form `reads` is
+    ``None``.
     """
 
     def __init__(
@@ -39,11 +43,18 @@ class AttributeTurns:
         # ``takes``: the control takes a scanline. ``loads``: the control takes a scanline with pixels.
         self.accepts, self.goes, self.takes = (Signal(name=name) for name in ("accepts", "goes", "takes"))
         self.loads, covered = Signal(name="loads_walk"), rows.payload.row.covered
-        opens = ~busy | self.leaves
+        opens, self.reads = ~busy | self.leaves, None
         if not serial:
             moves = ~busy | self.advance
-            m.d.comb += [self.ends.eq(1), self.steps.eq(1), rows.ready.eq(opens & moves)]
+            self.due = due = Signal(name="planes_due", init=1)
+            self.reads = Signal(name="reads")
+            m.d.comb += [self.ends.eq(1), self.steps.eq(1), rows.ready.eq(opens & moves & ~due)]
             m.d.comb += [self.accepts.eq(rows.valid & rows.ready), self.takes.eq(self.accepts)]
+            m.d.comb += self.reads.eq(rows.valid & opens & moves & due)
+            with m.If(self.reads):
+                m.d.sync += due.eq(0)
+            with m.Elif(self.accepts):
+                m.d.sync += due.eq(rows.payload.row.last)
             m.d.comb += self.goes.eq(self.accepts | (busy & self.advance))
             m.d.comb += self.loads.eq(self.takes & covered)
             return
@@ -226,10 +237,14 @@ class ScanlineWalk:
         steps = AttributeRing(m, f"{name}_step", self.turns)
         near, total, step = nears.value, totals.value, steps.value
         far = (total + sum(Mux(bit, step << k, 0) for k, bit in enumerate(self.digit)))[:_BITS]
-        with m.If(loads):
-            steps.becomes(m, inward)
-        with m.Elif(self.moves):
-            steps.becomes(m, Mux(self.ends, following_step, step << len(self.digit)))
+        if inward is following_step:
+            with m.If(loads | self.moves):
+                steps.becomes(m, Mux(loads | self.ends, inward, step << len(self.digit)))
+        else:
+            with m.If(loads):
+                steps.becomes(m, inward)
+            with m.Elif(self.moves):
+                steps.becomes(m, Mux(self.ends, following_step, step << len(self.digit)))
 
         def late(value, word):
             return self.turns.late(m, value, f"{name}_late_{word}")

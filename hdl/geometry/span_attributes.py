@@ -33,7 +33,7 @@ _WORDS = ("start", "short", "long", "inward")
 
 
 def planes_rows_shape(serial: bool = False, surface: AttributeSpans | None = None) -> data.StructLayout:
-    """Shape of a scanline with its triangle's planes, which are read with the triangle's first scanline.
+    """Shape of a scanline with its triangle's planes, which are read at the triangle's first scanline.
 
     With ``serial`` the shape has the plane of one attribute, and a scanline comes once for each attribute.
     With texture coordinates a scanline has their base, range and level, too.
@@ -74,7 +74,8 @@ def whole_span_shape(surface: AttributeSpans | None = None) -> data.StructLayout
 class SpanAttributesUnit(wiring.Component):
     """Walks attributes down the long edge and along the spans. `SpanAttributes` is the bit-accurate model.
 
-    A scanline without pixels takes a cycle. Every piece of p pixels takes as many cycles as ``p - 1`` has
+    A triangle takes a cycle, on which its planes are read before its first scanline is taken in. A scanline
+    without pixels takes a cycle. Every piece of p pixels takes as many cycles as ``p - 1`` has
     bits, but at least one. If n pixels are cut off at the long edge, the scanline takes one more cycle for
     each bit of n. So a piece never takes more cycles than it has pixels. The fastest spans have one or two
     pixels in one piece, and no pixel cut off at the long edge. They are offered `latency` cycles, 3, after
@@ -102,8 +103,8 @@ class SpanAttributesUnit(wiring.Component):
     Members
     -------
     i : :py:`In(stream.Signature(planes_rows_shape(serial, surface)))`
-        Scanlines. The planes are read with the first scanline of a triangle. This is the first of all
-        scanlines, or the scanline after a scanline with ``last``.
+        Scanlines. The planes are read while the first scanline of a triangle is offered. This is the first of
+        all scanlines, or the scanline after a scanline with ``last``.
     o : :py:`Out(stream.Signature(pieces_shape()))`
         Pieces, or whole spans in `whole_spans_shape` (if serial, in `whole_span_shape`).
     status : :py:`Out(counters_shape("empty", "cut"))`
@@ -114,6 +115,10 @@ class SpanAttributesUnit(wiring.Component):
     ----------
     idle : Signal
         High while no scanline is walked and no piece waits.
+    reads, due : Signal
+        Not in the serial form. On the cycle on which ``reads`` is high, the unit reads the planes of a
+        triangle. From then on they may change. ``due`` is high while the next scanline's planes have not been
+        read.
 
     Source: docs/theory/geometry.md#normals; [T] figure 4.10 (normals along the edges).
     """
@@ -130,6 +135,8 @@ class SpanAttributesUnit(wiring.Component):
             }
         )
         self.idle = Signal(name="idle")
+        if not serial:
+            self.reads, self.due = Signal(name="reads_planes"), Signal(name="due")
 
     def elaborate(self, platform):
         """The long edge's values, the walk along a scanline, and the pieces' words."""
@@ -142,28 +149,32 @@ class SpanAttributesUnit(wiring.Component):
         attributes = attribute_count(self._surface)
         turns = AttributeTurns(m, self.i, busy, self.serial, not self.whole, attributes)
         m.d.comb += [accept.eq(turns.accepts), loads.eq(accept & row.covered)]
+        if not self.serial:
+            m.d.comb += [self.reads.eq(turns.reads), self.due.eq(turns.due)]
         with m.If(turns.goes & turns.loads):
             m.d.sync += copy_fields(tag, row, flags.members)
 
         # A whole span is a single piece, so it is the last piece.
-        longest = Mux(first, _mask(planes.piece), mask)
+        longest = Mux(first, _mask(planes.piece), mask) if self.serial else mask
         if self.whole:
             longest = mask = Const((1 << PIXEL_BITS) - 1)
         walk = ScanlineWalk(m, row, tag, longest, mask, loads, busy, turns)
         with m.If(turns.goes & turns.takes):
             m.d.sync += [first.eq(row.last), drawn.eq(row.covered | (drawn & ~first))]
-            if not self.whole:
+            if self.serial and not self.whole:
                 with m.If(first):
                     m.d.sync += [mask.eq(longest), walk.single.eq(planes.piece == 0)]
-                    if self.serial:
-                        # The last step of a whole piece takes one bit or two.
-                        m.d.sync += walk.double.eq(~planes.piece[0] & (planes.piece != 0))
+                    # The last step of a whole piece takes one bit or two.
+                    m.d.sync += walk.double.eq(~planes.piece[0] & (planes.piece != 0))
+        if not (self.serial or self.whole):
+            with m.If(turns.reads):
+                m.d.sync += [mask.eq(_mask(planes.piece)), walk.single.eq(planes.piece == 0)]
         count = 1 if self.serial else attributes
         walked = Signal(self._walked_shape(count), name="found")
         for k in range(count):
             plane = {name: planes[name] if self.serial else planes[name][k] for name in _WORDS}
             base, inward = self._down(m, k, accept, first, row.carry, plane, turns)
-            begin = Mux(first, _code(plane["inward"]), inward)
+            begin = Mux(first, _code(plane["inward"]), inward) if self.serial else inward
             near, far = walk.values(m, f"attribute_{k}", loads, base, begin, inward, not self.whole)
             with m.If(turns.advance):
                 m.d.sync += [walked.near[k].eq(near), walked.far[k].eq(far), walked.step[k].eq(inward)]
@@ -227,13 +238,21 @@ class SpanAttributesUnit(wiring.Component):
         short, long, inward, edge = (
             AttributeRing(m, f"{name}_{k}", turns) for name in ("short", "long", "inward", "edge")
         )
-        steps = [
-            Mux(first, _code(plane[name]), ring.value) for name, ring in (("short", short), ("long", long))
-        ]
         start = Cat(
             Const(0, GradientSetup.FORMAT.fraction_bits - GradientSetup.START_FORMAT.fraction_bits),
             Value.cast(plane["start"]),
         )
+        if turns.reads is not None:
+            with m.If(turns.reads):
+                edge.becomes(m, start)
+                for name, ring in (("short", short), ("long", long), ("inward", inward)):
+                    ring.becomes(m, _code(plane[name]))
+            with m.Elif(accept):
+                edge.becomes(m, edge.value + Mux(carry, long.value, short.value))
+            return edge.value, inward.value
+        steps = [
+            Mux(first, _code(plane[name]), ring.value) for name, ring in (("short", short), ("long", long))
+        ]
         base = Mux(first, start, edge.value)
         with m.If(accept):
             edge.becomes(m, base + Mux(carry, steps[1], steps[0]))
