@@ -126,6 +126,6 @@ def _core_file(core: Core) -> str:
         "    flow_options:",
         "      tool: verilator",
         "      cocotb_module: 'test_core,test_status'",
-        "      verilator_options: [--timescale, 1ns/1ps, -Wno-fatal, --output-split, '0']",
+        "      verilator_options: [--timescale, 1ns/1ps, -Wno-fatal, --output-split, '0', -CFLAGS, -O0]",
     ]
     return "\n".join(lines) + "\n"
