@@ -88,7 +88,7 @@ RECORD = Record(
     },
     axis="",
     still={
-        "the second difference of w is positive and less than 2": "second[97] change_1[48]",
+        "the second difference of w is positive and less than 2": "second[97]",
         "the second difference of z is a multiple of 8": "second[98-100]",
         "cos a is not negative": "line_z0_b[17]",
         "words of the first lane change by twice a step": "line_0[0] line_0_of_0[0] height_0[0]",
