@@ -16,8 +16,8 @@ TEST_EXTRAS := $(if $(shell command -v c++ || command -v g++ || command -v clang
 LINT := import tomllib; of = tomllib.load(open("pyproject.toml", "rb"))["project"]; \
 	print(*of["optional-dependencies"]["lint"], *(one for one in of["dependencies"] if one.startswith(("click", "numpy"))), sep="\n")
 
-.PHONY: demo test test-quick test-all test-long test-ci prove prove-ci decided mutants soak coverage bench pages site \
-	lint style types clean
+.PHONY: demo test test-quick test-all test-long test-ci prove prove-ci decided adversary mutants soak coverage bench \
+	pages site lint style types clean
 
 demo: $(VENV)/.installed
 	$(BIN)/blysk render teapot --size 640x480 --compare teapot.png
@@ -56,6 +56,10 @@ decided: $(VENV)/.installed-test
 	DECIDED=$(CURDIR)/build/decided $(BIN)/python -m pytest -n $(TEST_WORKERS) --no-loadscope-reorder \
 		-m "prove or long" tests/formal tests/test_units.py
 	LC_ALL=C sort -u build/decided > tests/decided.txt
+
+# A search for the largest errors. ADVERSARY_SEED=N searches from another seed.
+adversary: $(VENV)/.installed-test
+	$(BIN)/python -m pytest -s -m long tests/judges/test_adversary.py
 
 mutants: $(VENV)/.installed-test
 	$(BIN)/python -m blysk.bench.quality.mutants
