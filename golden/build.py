@@ -9,7 +9,9 @@ if TYPE_CHECKING:
     from blysk.golden.geometry.coarse_depth import CoarseDepth
 
 __all__ = [
+    "ATTRIBUTES",
     "LANES",
+    "MEMORIES",
     "PIPES",
     "PORTS",
     "SETUPS",
@@ -44,6 +46,12 @@ PORTS = ("native", "axi", "wishbone")
 
 STREAMS = (32, 64, 128)
 """Bits of a beat of AXI4-Stream, for a core on a bus."""
+
+MEMORIES = ("asynchronous", "synchronous")
+"""Reads of the memories in Verilog: some within a cycle, or all at a clock edge."""
+
+ATTRIBUTES = ("vivado", "quartus", "synplify", "gowin")
+"""Synthesis tools whose attributes the Verilog can have."""
 
 
 class BuildError(ValueError):
@@ -101,6 +109,13 @@ class Build:
     stream : {None, 32, 64, 128}
         Bits of a beat of both AXI4-Streams of a core on a bus; ``None``: all bytes of a triangle, span or
         pixel.
+    memories : {"asynchronous", "synchronous"}
+        Reads of the memories in Verilog and in blysk fpga. ``synchronous`` is for FPGAs and chips whose
+        memories have no read within a cycle. Each cycle stays the same.
+    zeros : bool
+        Whether Verilog gives initial zeros to memories that the core writes.
+    attributes : {"vivado", "quartus", "synplify", "gowin"} or None
+        Synthesis tool whose attributes place memories and multipliers in Verilog; ``None``: no attributes.
 
     Raises
     ------
@@ -120,6 +135,9 @@ class Build:
     coarse: "CoarseDepth | None" = None
     bus: str = "native"
     stream: int | None = None
+    memories: str = "asynchronous"
+    zeros: bool = False
+    attributes: str | None = None
 
     def __post_init__(self) -> None:
         for name, values in _CHOICES.items():
@@ -192,5 +210,7 @@ _CHOICES = {
     "geometry_style": (None, *STYLES),
     "bus": PORTS,
     "stream": (None, *STREAMS),
+    "memories": MEMORIES,
+    "attributes": (None, *ATTRIBUTES),
 }
 """Values that are accepted, for fields that have few values."""

@@ -1,4 +1,13 @@
-"""FIFOs and delays in memories, and reads through the output register of an FPGA's memory block."""
+"""FIFOs and delays in memories, and reads through the output register of an FPGA's memory block.
+
+Some FPGAs and chips read a memory at a clock edge only. Within `clocked_reads` the functions of this file
+make these reads. Each word comes in the same cycle as without `clocked_reads`.
+"""
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from contextvars import ContextVar
+from typing import Any
 
 from amaranth.hdl import Cat, Module, Mux, Shape, Signal, Value, ValueLike
 from amaranth.lib import stream
@@ -10,10 +19,12 @@ __all__ = [
     "HEADED_FIFO_LATENCY",
     "LATE_FIFO_LATENCY",
     "UNCOUNTED",
+    "clocked_reads",
     "connect_headed_fifo",
     "connect_late_fifo",
     "connect_wide_fifo",
     "delayed",
+    "first_in_turn",
     "pass_beside",
     "registered_read",
     "turn_of",
@@ -28,6 +39,34 @@ LATE_FIFO_LATENCY = 4
 
 UNCOUNTED = 3
 """Largest number of payloads inside `connect_late_fifo` that its level does not count yet."""
+
+_CLOCKED: ContextVar[bool] = ContextVar("clocked", default=False)
+
+
+@contextmanager
+def clocked_reads(wanted: bool = True) -> Iterator[None]:
+    """Within the block, memories of components that are elaborated are read at clock edges.
+
+    Parameters
+    ----------
+    wanted : bool
+        Whether they are. If not, nothing changes.
+    """
+    token = _CLOCKED.set(wanted)
+    try:
+        yield
+    finally:
+        _CLOCKED.reset(token)
+
+
+def _reads(memory: Memory) -> dict[str, Any]:
+    """Options of a read port for an address in a register. A clocked port sees a write at its edge."""
+    return {"transparent_for": memory.write_ports} if _CLOCKED.get() else {"domain": "comb"}
+
+
+def _place(address: Value, following: Value) -> Value:
+    """Address of a port with `_reads`: a register, or its next value, which a clocked read needs."""
+    return following[: len(address)] if _CLOCKED.get() else address
 
 
 def words_in_turn(m: Module, name: str, word: ValueLike, written: Value, depth: int) -> Memory:
@@ -51,6 +90,29 @@ def words_in_turn(m: Module, name: str, word: ValueLike, written: Value, depth: 
     with m.If(written):
         m.d.sync += write.addr.eq(write.addr + 1)
     return memory
+
+
+def first_in_turn(m: Module, memory: Memory, taken: Value) -> Value:
+    """The first word of `words_in_turn` that has not been taken.
+
+    Parameters
+    ----------
+    m : Module
+        Module of the memory.
+    memory : Memory
+        The memory, with its write port.
+    taken : Value
+        Whether the first word is taken.
+    """
+    read = memory.read_port(**_reads(memory))
+    if not _CLOCKED.get():
+        with m.If(taken):
+            m.d.sync += read.addr.eq(read.addr + 1)
+        return read.data
+    address = Signal.like(read.addr, name="address")
+    m.d.comb += read.addr.eq(address + taken)
+    m.d.sync += address.eq(read.addr)
+    return read.data
 
 
 def pass_beside(m: Module, name: str, word: ValueLike, written: Value, taken: Value, depth: int) -> ValueLike:
@@ -78,10 +140,13 @@ def pass_beside(m: Module, name: str, word: ValueLike, written: Value, taken: Va
     """
     bits = (depth - 1).bit_length()
     words = words_in_turn(m, name, word, written, 1 << bits)
-    first, second = (words.read_port(domain="comb") for _ in range(2))
+    first, second = (words.read_port(**_reads(words)) for _ in range(2))
     address, following = Signal(bits, name=f"{name}_address"), Signal(bits, name=f"{name}_following", init=1)
     leaves = Signal(len(Value.cast(word)), name=f"{name}_leaves", reset_less=True)
-    m.d.comb += [first.addr.eq(address), second.addr.eq(following)]
+    m.d.comb += [
+        first.addr.eq(_place(address, Mux(taken, following, address))),
+        second.addr.eq(_place(following, following + taken)),
+    ]
     with m.If(taken):
         m.d.sync += [address.eq(following), following.eq(following + 1)]
     # ``taken`` comes late in a cycle, so both words that can be next are read before.
@@ -122,10 +187,15 @@ def registered_read(
     moves : Value
         Whether the registers take new words.
     """
-    port = memory.read_port(domain="comb")
+    port = memory.read_port(domain="sync" if _CLOCKED.get() else "comb")
     moves = wanted if write is None else wanted & ~(write.en & (write.addr == address))
     read, word = (Signal(len(port.data), name=name, reset_less=True) for name in ("read", "word"))
     m.d.comb += port.addr.eq(address)
+    if _CLOCKED.get():
+        m.d.comb += [port.en.eq(moves), read.eq(port.data)]
+        with m.If(moves):
+            m.d.sync += word.eq(read)
+        return word, moves
     with m.If(moves):
         m.d.sync += [read.eq(port.data), word.eq(read)]
     return word, moves
@@ -164,14 +234,17 @@ def delayed(m: Module, name: str, value: Value, cycles: int, turn: Value) -> Sig
     """
     m.submodules[name] = memory = Memory(shape=len(Value.cast(value)), depth=cycles - 1, init=[])
     word = Signal(value.shape(), name=name, reset_less=True)
-    write, read = memory.write_port(), memory.read_port(domain="comb")
+    write, read = memory.write_port(), memory.read_port(domain="sync" if _CLOCKED.get() else "comb")
     m.d.comb += [
         write.addr.eq(turn),
         write.data.eq(value),
         write.en.eq(1),
         read.addr.eq(turn),
     ]
-    m.d.sync += Value.cast(word).eq(read.data)
+    if _CLOCKED.get():
+        m.d.comb += Value.cast(word).eq(read.data)
+    else:
+        m.d.sync += Value.cast(word).eq(read.data)
     return word
 
 
@@ -262,7 +335,7 @@ def connect_wide_fifo(
     width = Shape.cast(source.payload.shape()).width
     bits = (depth - 1).bit_length()
     m.submodules[name] = memory = Memory(shape=width, depth=1 << bits, init=[])
-    write, read = memory.write_port(), memory.read_port(domain="comb")
+    write, read = memory.write_port(), memory.read_port(**_reads(memory))
     first, free = (Signal(bits, name=f"{name}_{word}") for word in ("first", "free"))
     room, some = Signal(name=f"{name}_room", init=1), Signal(name=f"{name}_some")
     level, following = (Signal(range(depth + 1), name=f"{name}_{word}") for word in ("level", "following"))
@@ -272,7 +345,7 @@ def connect_wide_fifo(
         sink.valid.eq(some),
         write.data.eq(source.payload),
         write.addr.eq(free),
-        read.addr.eq(first),
+        read.addr.eq(_place(first, first + goes)),
         # A word written without a payload is overwritten later.
         write.en.eq(room),
         Value.cast(sink.payload).eq(read.data),
@@ -326,15 +399,15 @@ def connect_headed_fifo(
     room, some = Signal(name=f"{name}_room", init=1), Signal(name=f"{name}_some")
     found = Signal(len(head), name=f"{name}_head", reset_less=True)
     comes, goes, fetches = source.valid & room, some & sink.ready, Signal(name=f"{name}_fetches")
-    read, of_heads = memory.read_port(domain="comb"), heads.read_port(domain="comb")
     for port, value in ((memory.write_port(), source.payload), (heads.write_port(), head)):
         # A word written without a payload is overwritten later.
         m.d.comb += [port.data.eq(value), port.addr.eq(free), port.en.eq(room)]
+    read, of_heads = memory.read_port(**_reads(memory)), heads.read_port(**_reads(heads))
     m.d.comb += [
         source.ready.eq(room),
         sink.valid.eq(some),
-        read.addr.eq(first),
-        of_heads.addr.eq(ahead),
+        read.addr.eq(_place(first, first + goes)),
+        of_heads.addr.eq(_place(ahead, ahead + fetches)),
         Value.cast(sink.payload).eq(read.data),
         fetches.eq((free != ahead) & (~some | sink.ready)),
     ]

@@ -13,6 +13,8 @@ from amaranth.hdl import Const, Module, Shape, ShapeLike, Value
 from amaranth.lib import data, wiring
 from amaranth.lib.wiring import In, Out
 
+from blysk.hdl.core.memory import clocked_reads
+from blysk.hdl.emit.memories import with_attributes, without_zeros
 from blysk.hdl.emit.yosys import run_yosys
 
 __all__ = ["check_name", "emit", "port_widths"]
@@ -66,6 +68,9 @@ def emit(
     *,
     header: Sequence[str] = (),
     descriptions: Mapping[str, str] | None = None,
+    zeros: bool = False,
+    memories: str = "asynchronous",
+    attributes: str | None = None,
 ) -> str:
     """Verilog-2001 text of a component, one module per submodule, without warnings.
 
@@ -74,8 +79,8 @@ def emit(
     example, the member ``i`` with the payload ``{"x": 12, "normal": ArrayLayout(SQ(1, 17), 3)}`` becomes
     ``i_valid``, ``i_ready``, ``i_x``, ``i_normal_0``, ``i_normal_1``, ``i_normal_2``. Ports carry bare codes.
     The port table at the top of the text gives direction, width, signedness, number format and description
-    of each port. A memory's read register starts undefined in Verilog simulators, and at 0 in Amaranth's own
-    simulator.
+    of each port. In Verilog simulators a memory that the component writes, and the read register of a memory,
+    start undefined. In Amaranth's own simulator they start at 0.
 
     Verilator (``-Wall``), Icarus Verilog (``-g2001 -Wall``) and Yosys read the text without a warning.
     The text switches off Verilator's warnings about the style of generated netlists, by name and with the
@@ -96,6 +101,13 @@ def emit(
         Descriptions of ports, each one line of ASCII. A key is a port's name, or the beginning of the name
         before an underscore: ``i_normal`` describes ``i_normal_0``. If several keys fit, the longest counts.
         ``clk``, ``rst``, ``valid`` and ``ready`` have descriptions already.
+    zeros : bool
+        Whether memories that the component writes start at 0 in Verilog simulators, too. Tables always have
+        their words.
+    memories : {"asynchronous", "synchronous"}
+        ``synchronous``: memories are read at clock edges, see `clocked_reads`.
+    attributes : str or None
+        Synthesis tool, see `with_attributes`.
 
     Returns
     -------
@@ -124,7 +136,10 @@ def emit(
             raise ValueError(f"a comment must be one line of printable ASCII, not {line!r}")
 
     bits = _ports(component)
-    text = _plain_identifiers(_yosys(rtlil.convert(_Flat(component, bits), name=name, emit_src=False)))
+    with clocked_reads(memories == "synchronous"):
+        netlist = rtlil.convert(_Flat(component, bits), name=name, emit_src=False)
+    given = netlist if zeros else without_zeros(netlist)
+    text = with_attributes(_plain_identifiers(_yosys(given)), attributes)
     declared = _declared(name, text)
     declared_names = re.findall(r"\w+", declared[1])
     cycles = [key for key in ("clk", "rst") if key in declared_names]

@@ -10,7 +10,7 @@ from blysk.golden.methods.local_chord_interpolator import LocalChordInterpolator
 from blysk.golden.normals.difference_accumulator import DifferenceAccumulator
 from blysk.golden.number.spans import LENGTH_BITS
 from blysk.hdl.core.fixed import FixedShape
-from blysk.hdl.core.memory import words_in_turn
+from blysk.hdl.core.memory import first_in_turn, words_in_turn
 from blysk.hdl.core.stream import FIFO_LATENCY, connect
 from blysk.hdl.core.views import copy
 from blysk.hdl.cosines.chord_setup import (
@@ -318,7 +318,4 @@ def _keep(m: Module, name: str, word: ValueLike, written: Value, taken: Value, d
     depth : int
         Largest number of words inside, a power of two.
     """
-    read = words_in_turn(m, name, word, written, depth).read_port(domain="comb")
-    with m.If(taken):
-        m.d.sync += read.addr.eq(read.addr + 1)
-    return read.data
+    return first_in_turn(m, words_in_turn(m, name, word, written, depth), taken)

@@ -5,11 +5,23 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any, Literal, NamedTuple, TypedDict, Union, get_args
 
 from blysk.golden.albedo.albedo import Albedo
-from blysk.golden.build import LANES, PIPES, PORTS, SETUPS, STREAMS, STYLES, TOPS, Style
+from blysk.golden.build import (
+    ATTRIBUTES,
+    LANES,
+    MEMORIES,
+    PIPES,
+    PORTS,
+    SETUPS,
+    STREAMS,
+    STYLES,
+    TOPS,
+    Style,
+)
 from blysk.golden.frame_constants import MAX_MATERIALS
 from blysk.golden.lighting.intensity import MAX_LIGHTS
 from blysk.golden.lighting.specular import MAX_EXPONENT
 from blysk.golden.methods.interpolator import Operand
+from blysk.golden.number.spans import LENGTH_BITS
 from blysk.golden.presets import METHODS, PUBLISHED
 from blysk.golden.reference.camera import PROJECTIONS
 from blysk.golden.reference.geometry import Mesh
@@ -307,6 +319,16 @@ NEEDS: dict[str, Option] = {
         f"Colours of pixels. {' '.join(f'{word}: {text}.' for word, text in Albedo.PARTS.items())}  "
         "[default: none]",
     ),
+    "grey": Option(
+        Truth(), False, "Build one channel in place of three. It reads the colour constants of red."
+    ),
+    "x_bits": Option(
+        Whole(1, LENGTH_BITS), LENGTH_BITS, "Bits of a column: pictures of at most 2^N columns."
+    ),
+    "y_bits": Option(Whole(1, LENGTH_BITS), LENGTH_BITS, "Bits of a row: pictures of at most 2^N rows."),
+    "length_bits": Option(
+        Whole(2, LENGTH_BITS), LENGTH_BITS, "Bits of the length of a span: at most 2^N - 1 pixels."
+    ),
 }
 """Parts of a design that a scene decides, for commands without a scene."""
 
@@ -361,6 +383,24 @@ BUILD: dict[str, Option] = {
         None,
         "Build a coarse depth test for pictures of at most this size. The test drops hidden spans before "
         "shading. Needs a core from triangles to pixels.",
+    ),
+    "memories": Option(
+        Choice("kind of memories", MEMORIES),
+        "asynchronous",
+        "synchronous: all memories are read at a clock edge, for FPGAs without memories in look-up tables "
+        "(iCE40, MAX 10) and for chips. Pixels and cycles stay the same.",
+    ),
+    "zeros": Option(
+        Truth(),
+        False,
+        "Write initial zeros of memories that the core writes. Without this option these memories start "
+        "undefined, and the core needs no initial value.",
+    ),
+    "attributes": Option(
+        Choice("synthesis tool", ATTRIBUTES),
+        None,
+        "Write the attributes by which this tool puts memories into block RAMs or look-up tables, and "
+        "products into multipliers.  [default: none]",
     ),
 }
 """Options of a core's Verilog. `design.built` turns them into fields of `Build`."""
@@ -447,6 +487,9 @@ class BuildOptions(SharedOptions, total=False):
     bus: Literal["native", "axi", "wishbone"]
     stream: Literal[32, 64, 128]
     coarse: tuple[int, int] | str
+    memories: Literal["asynchronous", "synchronous"]
+    zeros: bool
+    attributes: Literal["vivado", "quartus", "synplify", "gowin"]
 
 
 class RenderOptions(SceneOptions, DesignOptions, SharedOptions, total=False):

@@ -285,4 +285,5 @@ def verilog_and_unit(
     else:
         header = [*lines, "", "Frame constants, through the write port:", *words]
         descriptions = _descriptions(unit)
-    return emit(unit, name, header=header, descriptions=descriptions), unit
+    text = {option: getattr(p.build, option) for option in ("zeros", "memories", "attributes")}
+    return emit(unit, name, header=header, descriptions=descriptions, **text), unit

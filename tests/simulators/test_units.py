@@ -48,12 +48,15 @@ UNITS = [
     if simulator == "icarus" or (variant == record.default and name in WHOLE)
 ]
 
+WITH_DEPTHS = ("depth_tester", "render")
+"""Units whose record has a memory of depths inside. Its zeros stand for a picture that was cleared."""
+
 
 @lru_cache(maxsize=1)
 def verilog_of(name, variant):
     """A component and its text, which both simulators share."""
     unit = RECORDS[name].variants[variant].unit()
-    return unit, emit(unit, "core")
+    return unit, emit(unit, "core", zeros=name in WITH_DEPTHS)
 
 
 @pytest.fixture

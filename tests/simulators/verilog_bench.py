@@ -297,7 +297,7 @@ def without_initial_values(text: str, keep: tuple[int, ...] = ()) -> str:
 
     def strip(module: re.Match) -> str:
         body = module[0]
-        written = set(re.findall(r"^\s+(\w+)(?:\[[^\]]*\])+ <= ", body, re.MULTILINE))
+        written = set(re.findall(r"^\s+(\w+)\[.*\] <= ", body, re.MULTILINE))
         sizes = dict(re.findall(r"^  reg (?:\[\d+:0\] )?(\w+) \[(\d+):0\];", body, re.MULTILINE))
         written -= {name for name in written if int(sizes.get(name, -1)) + 1 in keep}
 
