@@ -2,8 +2,9 @@
 
 from blysk.sim.cli.lazy_command import LazyCommand
 
-__all__ = ["bench", "blocks", "board", "explore", "fpga", "pages", "web"]
+__all__ = ["absorb", "bench", "blocks", "board", "explore", "fpga", "pages", "web"]
 
+absorb = LazyCommand("Move registers into multipliers of a netlist for ECP5.", "blysk.bench.cli.absorb")
 bench = LazyCommand("Measure error against run time, and write the report.", "blysk.bench.cli.bench")
 blocks = LazyCommand("Print the table of the units: errors, times, parts.", "blysk.bench.cli.blocks")
 board = LazyCommand(

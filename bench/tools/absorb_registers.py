@@ -94,6 +94,19 @@ class _Netlist:
         self.inverted: dict[int, int] = {}
         self.removed = 0
 
+    def without_registers(self, kind: str) -> list[str]:
+        """Names, in order, of the cells of a kind whose own registers are unused."""
+        return sorted(
+            name
+            for name, cell in self.cells.items()
+            if cell["type"] == kind
+            and not any(
+                (key.startswith("REG_") and key.endswith("_CLK") and value != "NONE")
+                or (key.startswith("REGMODE_") and value != "NOREG")
+                for key, value in cell["parameters"].items()
+            )
+        )
+
     def net(self, cell: str, port: str) -> Any:
         """Net or constant at a port of one bit."""
         (bit,) = self.cells[cell]["connections"].get(port, ["x"])
@@ -343,6 +356,7 @@ def absorb_registers(netlist: Mapping[str, Any], top: str = "top") -> tuple[dict
 
     All bits of an operand, or of a product, must be flip-flops of the same clock and enable. They must have
     no reset, be 0 at power-up, and not be at a port of the module. Bits of an operand may also be constant 0.
+    Multipliers and block RAMs that have registers inside already stay as they are.
     Each bit of a product must have one reader, its flip-flop. A flip-flop of an operand with another reader
     also stays for that reader. The flip-flops of only one operand move if there are flip-flops before them
     and the product has a register, too. An enable that flip-flops use inverted gets one look-up table for
@@ -352,8 +366,7 @@ def absorb_registers(netlist: Mapping[str, Any], top: str = "top") -> tuple[dict
     Parameters
     ----------
     netlist : dict
-        Yosys's JSON of a flat module, mapped to ECP5. It is not changed. Multipliers and block RAMs have no
-        registers yet.
+        Yosys's JSON of a flat module, mapped to ECP5. It is not changed.
     top : str
         The module.
 
@@ -369,14 +382,13 @@ def absorb_registers(netlist: Mapping[str, Any], top: str = "top") -> tuple[dict
     module = netlist["modules"][top]
     work = _Netlist(module)
     operands = products = closed = 0
-    for name in sorted(name for name, cell in work.cells.items() if cell["type"] == _MULTIPLIER):
+    for name in work.without_registers(_MULTIPLIER):
         product = work.absorb_product(name)
         inputs = work.absorb_operands(name, product)
         products += product
         operands += inputs
         closed += product and inputs == 2
-    memories = sorted(name for name, cell in work.cells.items() if cell["type"] == _MEMORY)
-    words = sum(work.absorb_words(name) for name in memories)
+    words = sum(work.absorb_words(name) for name in work.without_registers(_MEMORY))
     chains = [name for name, cell in work.cells.items() if cell["type"] == _CARRY]
     carries = sum(work.end_carry(name) for name in chains)
     modules = {**netlist["modules"], top: {**module, "cells": work.cells}}
