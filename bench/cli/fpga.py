@@ -16,8 +16,8 @@ from blysk.sim.value_types import Choice, OutputFile, Whole
 
 __all__ = ["command"]
 
-_BUILD = {name: BUILD[name] for name in ("lanes", "pipes", "top", "setups")}
-_NEEDS = {name: NEEDS[name] for name in ("lights", "albedo")}
+_BUILD = {name: BUILD[name] for name in ("lanes", "pipes", "top", "setups", "memories")}
+_NEEDS = {name: NEEDS[name] for name in ("lights", "albedo", "grey", "x_bits", "y_bits", "length_bits")}
 # The committed figures are of linear light.
 _DESIGN = DESIGN | {"transfer": DESIGN["transfer"]._replace(default="linear")}
 
@@ -137,11 +137,14 @@ def command(
     family = DEVICES[family_name] if family_name else ECP5_85F if several else ECP5
     family = replace(family, target=target)
     from blysk.bench.tools.fpga import about, count_by_unit, pipelines_of, place, units_of
+    from blysk.hdl.core.memory import clocked_reads
 
     designs = list(units_of(units) if units else pipelines_of(chosen, every_method, build))
+    clocked = build.get("memories") == "synchronous"
     # Report a missing tool before the work.
     about(family)
-    if by_unit:
-        count_by_unit(designs, family, not keep_registers, figures)
-    else:
-        place(designs, family, seeds, jobs, not keep_registers, figures)
+    with clocked_reads(clocked):
+        if by_unit:
+            count_by_unit(designs, family, not keep_registers, figures)
+        else:
+            place(designs, family, seeds, jobs, not keep_registers, figures)

@@ -34,6 +34,7 @@ from blysk.bench.tools.place_and_route import Layout, lay_out, versions_of
 from blysk.bench.tools.tool_runner import TooLarge
 from blysk.bench.units.names import UNITS
 from blysk.golden.build import Build
+from blysk.golden.number.spans import LENGTH_BITS
 from blysk.golden.pipeline import ShadingPipeline
 from blysk.golden.presets import METHODS
 from blysk.hdl.bus.bus import core_of
@@ -152,6 +153,9 @@ def name_of(design: ShadingPipeline, operand: str | None = None) -> str:
     name += [operand] if operand else []
     name += ["gate"] if design.gate else []
     name += [" and ".join(design.albedo.parts)] if design.albedo else []
+    name += ["grey"] if design.grey else []
+    bits = {word: getattr(design, f"{word}_bits") for word in ("x", "y", "length")}
+    name += [f"{word} in {number} bits" for word, number in bits.items() if number != LENGTH_BITS]
     name += [design.transfer] if design.transfer != "linear" else []
     default = vars(Build(top=build.top))
     changed = {option: value for option, value in vars(build).items() if value != default[option]}

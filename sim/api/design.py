@@ -8,6 +8,7 @@ from typing import Any, TypeVar, Unpack, cast
 from blysk.golden.albedo.albedo import Albedo
 from blysk.golden.build import BuildError
 from blysk.golden.lighting.lobe import Lobe
+from blysk.golden.number.spans import LENGTH_BITS
 from blysk.golden.pipeline import ShadingPipeline
 from blysk.golden.pixel_pipelines import PixelPipelines
 from blysk.golden.presets import METHODS, MIRROR_LOBES, PUBLISHED, preset
@@ -29,6 +30,10 @@ def design(
     materials: int = 1,
     factors: int = 0,
     albedo: str | Sequence[str] | None = None,
+    grey: bool = False,
+    x_bits: int = LENGTH_BITS,
+    y_bits: int = LENGTH_BITS,
+    length_bits: int = LENGTH_BITS,
     **options: Unpack[DesignOptions],
 ) -> costed_design.Design:
     """A pipeline with the defaults of the command line.
@@ -41,6 +46,10 @@ def design(
         Number of lights that fade, by distance or as spots. They are the first lights. Needs ``chord-local``.
     albedo : str or sequence of str, optional
         Colours of pixels: words of `Albedo.PARTS`, see `Albedo.of_parts`. By default there are none.
+    grey : bool
+        Whether there is one channel in place of three, see `ShadingPipeline`.
+    x_bits, y_bits, length_bits : int
+        Bits of the coordinates, 1 to 12, and of the length of a span, 2 to 12.
     method : str
         Method of interpolation along a span: one of `METHODS`; by default see `default_method`.
     model : str
@@ -61,9 +70,11 @@ def design(
     InputError
         If there is no such pipeline.
     """
-    needs = {"lights": lights, "materials": materials, "factors": factors, "albedo": albedo}
+    words = {"grey": grey, "x_bits": x_bits, "y_bits": y_bits, "length_bits": length_bits}
+    needs = {"lights": lights, "materials": materials, "factors": factors, "albedo": albedo, **words}
     settings = read_settings("", {**options, **needs}, {**DESIGN, **NEEDS})
     made = design_of(settings, settings["lights"], settings["materials"])
+    made = replace(made, **{name: settings[name] for name in words})
     try:
         made = replace(made, factors=tuple(range(settings["factors"])))
     except ValueError as error:

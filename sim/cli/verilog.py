@@ -24,6 +24,10 @@ def _check_bench(made: ShadingPipeline, option: str) -> None:
     """Refuse cores that the test bench of an option does not drive."""
     if made.texels_outside:
         raise InputError(option, "its bench has no memory of texels", "leave out outside")
+    for name, least in (("x_bits", 6), ("y_bits", 6), ("length_bits", 7)):
+        if (bits := getattr(made, name)) < least:
+            thing = f"--{name.replace('_', '-')} {bits}"
+            raise InputError(thing, f"the frame of {option} has 64x48 pixels", f"give at least {least}")
 
 
 def _check_folders(output: str | None, folders: Mapping[str, str]) -> None:

@@ -77,6 +77,7 @@ print(*names, set(helped), set(refused), heavy & sys.modules.keys(), errors.getv
 def test_help_and_refused_arguments_load_nothing_heavy(tmp_path):
     """For every command the code that does the work is imported after the checks."""
     refused = [
+        "absorb missing.json -o a.json",
         "bench --only nothing",
         "bench --jobs 0",
         "bench --cluster nowhere",
@@ -100,6 +101,8 @@ def test_help_and_refused_arguments_load_nothing_heavy(tmp_path):
         "pages file/new",
         "render missing.obj",
         "verilog --pipes 3",
+        "verilog --attributes tool",
+        "verilog --y-bits 5 --testbench bench",
         "verilog --method quotient --gate",
         "verilog -o no/core.v",
         "fpga --method quotient --gate",
@@ -111,7 +114,7 @@ def test_help_and_refused_arguments_load_nothing_heavy(tmp_path):
     done = subprocess.run(
         [sys.executable, "-c", QUICK, *refused], cwd=tmp_path, capture_output=True, text=True, check=True
     )
-    commands = "bench blocks board explore fpga pages render verilog web"
+    commands = "absorb bench blocks board explore fpga pages render verilog web"
     assert done.stdout == f"{commands} {{0}} {{2}} set() {len(refused)}\n"
     assert [path.name for path in tmp_path.iterdir()] == ["file"]
 

@@ -168,6 +168,9 @@ def test_designs():
     textured = {"albedo": "colors,bilinear", "transfer": "srgb"}
     whole = "pipeline quotient, blinn, 1 light, colors and bilinear, srgb"
     assert names(fpga.pipelines_of(textured, False)) == [whole]
+    few = {"grey": True, "x_bits": 9, "length_bits": 5}
+    whole = "pipeline quotient, blinn, 1 light, grey, x in 9 bits, length in 5 bits, memories synchronous"
+    assert names(fpga.pipelines_of(few, False, {"memories": "synchronous"})) == [whole]
     assert names(fpga.pipelines_of({"model": "exp"}, False)) == ["pipeline renormalise, exp, 1 light"]
     assert names(fpga.pipelines_of({}, True)) == [f"pipeline {m}, blinn, 1 light" for m in fpga.METHODS]
 
@@ -182,6 +185,11 @@ def test_designs():
         (
             ["--setups", "2"],
             "--setups 2: spans need no triangle setup; use top geometry or render",
+        ),
+        (["--length-bits", "1"], "--length-bits 1: out of range; give a whole number from 2 to 12\n"),
+        (
+            ["--memories", "fast"],
+            "--memories fast: unknown kind of memories; use one of asynchronous, synchronous\n",
         ),
         (["--seeds", "0"], "--seeds 0: out of range; give a whole number from 1 to 100"),
         (["--jobs", "no"], "--jobs no: not a whole number; give"),
