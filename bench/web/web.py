@@ -23,9 +23,7 @@ from blysk.bench.web.documents import DOCUMENTS, documents
 from blysk.bench.web.web_data import (
     BACKGROUND,
     BANDS,
-    COLUMNS,
     HEIGHT,
-    MESHES,
     REFERENCES,
     RIVAL,
     START,
@@ -39,6 +37,8 @@ from blysk.bench.web.web_data import (
 )
 from blysk.bench.web.web_designs import COLORED, DESIGNS
 from blysk.bench.web.web_folder import MARK, PAGE, check_folder, earlier, report_files
+from blysk.bench.web.web_meshes import MESHES
+from blysk.bench.web.web_spans import COLUMNS
 from blysk.golden.lighting.specular import MAX_EXPONENT
 from blysk.golden.presets import LOBES, MIRROR_LOBES, MODELS
 from blysk.sim.engines.cache import version_of

@@ -3,16 +3,17 @@
 import base64
 import inspect
 import zlib
-from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from functools import cache
 from typing import Any
 
 import numpy as np
 
 from blysk.bench import accuracy
-from blysk.bench.surfaces import grid, sphere
 from blysk.bench.web.web_designs import ALBEDO, COLORED
+from blysk.bench.web.web_meshes import MESHES
+from blysk.bench.web.web_spans import encode
 from blysk.golden.cosines.quotient_spans import MARGIN, QuotientSpans, SpanVectors
 from blysk.golden.frame_constants import (
     EMISSION_ADDRESS,
@@ -38,7 +39,6 @@ from blysk.golden.number.unit_vector import COMPONENT, ONE
 from blysk.golden.pipeline import ShadingPipeline, Spans
 from blysk.golden.presets import LOBES, METHODS, MIRROR_LOBES, MODELS, preset
 from blysk.golden.reference.camera import Camera
-from blysk.golden.reference.geometry import Mesh, normalise
 from blysk.golden.reference.lighting import Light, Material
 from blysk.golden.reference.lobes import GGX
 from blysk.golden.reference.raster import Raster, rasterise
@@ -48,28 +48,22 @@ from blysk.golden.reference.reflection import (
     PowerModel,
 )
 from blysk.golden.reference.scene import Scene
-from blysk.golden.reference.texture import Texture
-from blysk.golden.reference.transfer import color_of_text, decode
+from blysk.golden.reference.transfer import color_of_text
 from blysk.sim.engines.engine import StopReason
 from blysk.sim.engines.probes import ObservedPipeline, probes_of
 from blysk.sim.engines.wasm import build, format_of, ports_of
 from blysk.sim.frames.animation import turntable
-from blysk.sim.meshes.teapot import teapot
 
 __all__ = [
     "BACKGROUND",
     "BANDS",
-    "COLUMNS",
     "HEIGHT",
-    "MESHES",
     "REFERENCES",
     "RIVAL",
     "ROUGHNESSES",
     "START",
     "WIDTH",
-    "Body",
     "design_of",
-    "encode",
     "lobe_of",
     "method",
     "model_table",
@@ -141,101 +135,6 @@ REFERENCES = {
 """References for comparison with the frame. ``None`` stands for the design's own curve or model."""
 
 
-# What is drawn.
-
-
-@dataclass(frozen=True)
-class Body:
-    """A mesh of the page.
-
-    Parameters
-    ----------
-    title : str
-        Title on the page.
-    make : callable
-        Function that makes the mesh.
-    views : int
-        Cameras of the turntable.
-    margin : float
-        See `Camera.framing`.
-    text : str
-        Line about its surface.
-    colored : bool
-        Whether its vertices have colours.
-    picture : callable, optional
-        Function that makes the picture of its texture: codes of sRGB, a uint8 array of shape (height, width,
-        3). The texture repeats the picture. It has levels, and the filter ``bilinear``.
-    """
-
-    title: str
-    make: Callable[[], Mesh]
-    views: int
-    margin: float = 0.05
-    text: str = "a surface of one colour"
-    colored: bool = False
-    picture: Callable[[], np.ndarray] | None = None
-
-    @property
-    def albedo(self) -> bool:
-        """Whether only a module with an albedo draws it."""
-        return self.colored or self.picture is not None
-
-    @property
-    def texture(self) -> Texture | None:
-        """Its texture in linear light."""
-        return None if self.picture is None else Texture(decode(self.picture() / 255))
-
-
-def _square() -> Mesh:
-    """Two triangles with normals that bend outwards. Some spans are as wide as the square."""
-    corners = np.array([(x, y, 0.0) for y in (-1, 1) for x in (-1, 1)])
-    return Mesh(corners, np.array([(0, 1, 3), (0, 3, 2)]), normalise(corners * 0.3 + (0, 0, 1)))
-
-
-def _torus() -> Mesh:
-    """A torus of 1024 triangles: colours that change around it, and three squares of texture around it."""
-    across, around = np.meshgrid(np.linspace(0, 1, 17), np.linspace(0, 1, 33), indexing="ij")
-    tube, ring = 2 * np.pi * across, 2 * np.pi * around
-    normals = np.stack([np.cos(tube) * np.cos(ring), np.sin(tube), np.cos(tube) * np.sin(ring)], axis=-1)
-    circle = np.stack([np.cos(ring), np.zeros_like(ring), np.sin(ring)], axis=-1)
-    colors = (1 + np.cos(ring[..., np.newaxis] + np.arange(3) * 2 * np.pi / 3)) / 2
-    places = np.stack([3 * around, across], axis=-1)
-    mesh = grid(circle + 0.45 * normals, normalise(normals))
-    return replace(mesh, colors=colors.reshape(-1, 3), coordinates=places.reshape(-1, 2))
-
-
-def _tiles() -> np.ndarray:
-    """A picture of 64x64 texels: a checker of tiles of 8x8 texels, with dark joints."""
-    row, column = np.indices((64, 64))
-    picture = np.array([(38, 96, 120), (233, 196, 106)], dtype=np.uint8)[(row // 8 + column // 8) % 2]
-    picture[(row % 8 == 0) | (column % 8 == 0)] = 24
-    return picture
-
-
-MESHES = {
-    "teapot": Body("Utah teapot", lambda: teapot(3000), 8),
-    "sphere": Body("sphere", lambda: sphere(24), 1, 0.15),
-    "square": Body("bent square", _square, 8, 0.1),
-    "colored": Body(
-        "torus, vertex colours",
-        lambda: replace(_torus(), coordinates=np.zeros((0, 2))),
-        1,
-        0.1,
-        "a colour at each vertex",
-        colored=True,
-    ),
-    "textured": Body(
-        "torus, texture",
-        lambda: replace(_torus(), colors=np.zeros((0, 3))),
-        1,
-        0.1,
-        "a texture of 64x64 texels with levels of detail, loaded again for each frame",
-        picture=_tiles,
-    ),
-}
-"""Meshes of the page, by name."""
-
-
 def design_of(method: str, model: str, albedo: bool = False) -> ShadingPipeline:
     """The pipeline of a module: one light, sRGB, and a highlight gate if the method can have one.
 
@@ -286,89 +185,6 @@ def scene_of(settings: Mapping[str, Any]) -> Scene:
 
 
 # Data of the page.
-
-COLUMNS = (
-    *({"name": name, "bytes": 2, "bias": 1 << 15, "running": True} for name in ("x", "y")),
-    {"name": "length", "bytes": 2, "bias": 0},
-    *({"name": f"normal_left.{c}", "bytes": 3, "bias": 1 << 23} for c in range(3)),
-    *(
-        {"name": f"normal_right.{c}", "bytes": 3, "bias": 1 << 23, "from": f"normal_left.{c}"}
-        for c in range(3)
-    ),
-    {"name": "ratio", "bytes": 3, "bias": 1 << 23},
-    *(
-        column
-        for line in ("attributes.start", "attributes.step")
-        for column in (
-            {"name": f"{line}.weight", "bytes": 3, "bias": 1 << 23},
-            *(
-                {"name": f"{line}.colors.{c}", "bytes": 4, "bias": 1 << 24, "from": f"{line}.weight"}
-                for c in range(3)
-            ),
-            *({"name": f"{line}.coordinates.{c}", "bytes": 3, "bias": 1 << 23} for c in range(2)),
-        )
-    ),
-    *({"name": f"attributes.{name}", "bytes": 1, "bias": 0} for name in ("exponent", "range", "level")),
-    *({"name": f"attributes.base.{c}", "bytes": 2, "bias": 1 << 15} for c in range(2)),
-)
-"""Columns of the spans in a file, one column for each field. Spans without an albedo lack ``attributes``.
-
-A column has the codes of its field. With ``running`` it has their change from the previous span, with
-``from`` their difference from another column. ``bias`` is added, so that no number is negative. A number
-takes ``bytes`` bytes.
-
-``ratio`` is ``round(2^19 log2(m_r / m_l))``, where m_l and m_r are the lengths of the interpolated normals at
-the ends. For a method whose own curve is exact, ``ratio`` is 0."""
-
-
-def encode(spans: Spans, visible: np.ndarray, ratio: np.ndarray | float = 1.0) -> bytes:
-    """Spans of a view, and the visibility of their fragments, as bytes compressed by zlib.
-
-    The bytes are, in this order:
-
-    - the numbers of spans, of fragments and of columns, 32 bits each;
-    - the first of the `COLUMNS`, in this number: of each column the lowest byte of all codes, then the next
-      byte of all codes;
-    - a bit for each fragment. A byte is filled from its lowest bit on.
-
-    Parameters
-    ----------
-    spans : Spans
-        Spans with normals.
-    visible : bool array
-        Whether each fragment is visible, in the order of the fragments.
-    ratio : array, shape (spans,), optional
-        Length of the interpolated normal at the right end, divided by its length at the left end.
-    """
-    logarithm = np.clip(np.log2(np.broadcast_to(ratio, len(spans))), -15, 15)
-    codes = {"x": spans.x, "y": spans.y, "length": spans.length, "ratio": np.rint(2**19 * logarithm)}
-    for name, normal in (("left", spans.normal_left), ("right", spans.normal_right)):
-        codes |= {f"normal_{name}.{c}": normal[:, c] for c in range(3)}
-    if spans.attributes is not None:
-        codes |= _by_path("attributes", spans.attributes.beats)
-    columns = [column for column in COLUMNS if column["name"] in codes]
-    parts = [np.array([len(spans), len(visible), len(columns)], dtype="<u4").tobytes()]
-    for column in columns:
-        values = np.asarray(codes[column["name"]], dtype=np.int64)
-        if "from" in column:
-            values = values - codes[column["from"]]
-        elif "running" in column:
-            values = np.diff(values, prepend=0)
-        split = (values + column["bias"]).astype("<u4").view(np.uint8).reshape(-1, 4)
-        parts += [split[:, byte].tobytes() for byte in range(column["bytes"])]
-    parts.append(np.packbits(visible, bitorder="little").tobytes())
-    return zlib.compress(b"".join(parts), 9)
-
-
-def _by_path(path: str, beats: Any) -> Iterator[tuple[str, np.ndarray]]:
-    """Codes of nested beats, with names and indices with dots between them."""
-    if isinstance(beats, Mapping):
-        for name, inner in beats.items():
-            yield from _by_path(f"{path}.{name}", inner)
-    elif beats.ndim == 2:
-        yield from ((f"{path}.{index}", codes) for index, codes in enumerate(beats.T))
-    else:
-        yield path, beats
 
 
 def spans_of(mesh: str, view: int, exponent: int, design: ShadingPipeline) -> tuple[Raster, Spans]:

@@ -6,7 +6,7 @@ import hashlib
 
 import numpy as np
 
-from blysk.bench.web import web_data
+from blysk.bench.web import web_data, web_meshes
 from blysk.golden.frame_constants import writes_of
 from blysk.golden.frames.frame import frame_buffer
 from blysk.golden.frames.prepare import PreparedFrame, constants_of
@@ -83,7 +83,7 @@ def digest(image):
 
 def prepared(state):
     """Scene, design and spans of the page's settings."""
-    albedo = web_data.MESHES[state["mesh"]].albedo
+    albedo = web_meshes.MESHES[state["mesh"]].albedo
     design = web_data.design_of(state["method"], state["model"], albedo)
     exponent = web_data.BANDS[-1] if state["model"] == "ggx" else state["exponent"]
     band = next(most for most in web_data.BANDS if exponent <= most)

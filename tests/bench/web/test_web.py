@@ -14,7 +14,7 @@ from amaranth.hdl import Fragment
 from click.testing import CliRunner
 
 from blysk.bench.cli.web import command
-from blysk.bench.web import web, web_data, web_designs, web_folder
+from blysk.bench.web import web, web_data, web_designs, web_folder, web_meshes, web_spans
 from blysk.golden.frame_constants import FrameConstants
 from blysk.golden.frames.prepare import prepare
 from blysk.golden.pipeline import Spans
@@ -38,7 +38,7 @@ def unpacked(data):
     raw = zlib.decompress(data)
     count, fragments, columns = np.frombuffer(raw[:12], "<u4").tolist()
     at, codes = 12, {}
-    for column in json.loads(json.dumps(web_data.COLUMNS))[:columns]:
+    for column in json.loads(json.dumps(web_spans.COLUMNS))[:columns]:
         values = np.zeros(count, dtype=np.int64)
         for byte in range(column["bytes"]):
             values += np.frombuffer(raw, np.uint8, count, at).astype(np.int64) << 8 * byte
@@ -54,14 +54,14 @@ def unpacked(data):
     return codes, visible.astype(bool)
 
 
-@pytest.mark.parametrize("mesh", web_data.MESHES)
+@pytest.mark.parametrize("mesh", web_meshes.MESHES)
 def test_spans_as_they_are_sent(mesh):
-    body = web_data.MESHES[mesh]
+    body = web_meshes.MESHES[mesh]
     scene = web_data.scene_of(web_data.START | {"mesh": mesh, "view": body.views - 1})
     design = web_data.design_of("quotient", "blinn", True) if body.albedo else preset("quadratic", "cosquad")
     frame = prepare(scene, design)
     ratio = frame.cut_raster.magnitude_right / frame.cut_raster.magnitude_left
-    codes, visible = unpacked(web_data.encode(frame.spans, frame.cut_raster.visible, ratio))
+    codes, visible = unpacked(web_spans.encode(frame.spans, frame.cut_raster.visible, ratio))
     np.testing.assert_allclose(2 ** (codes["ratio"] / 2**19), ratio, rtol=2**-19)
     for name in ("x", "y", "length"):
         np.testing.assert_array_equal(codes[name], getattr(frame.spans, name))
@@ -89,7 +89,7 @@ def test_extreme_codes_are_kept():
     ends = np.array([[most, -most, 0], [-most, most, -1], [0, 0, most]])
     place = np.array([0, 4095, 0])
     spans = Spans(place, place[::-1], np.array([4095, 0, 1]), ends, ends[::-1])
-    codes, visible = unpacked(web_data.encode(spans, np.array([True] * 4095 + [False])))
+    codes, visible = unpacked(web_spans.encode(spans, np.array([True] * 4095 + [False])))
     np.testing.assert_array_equal(codes["x"], spans.x)
     np.testing.assert_array_equal(codes["length"], spans.length)
     for c in range(3):
@@ -228,7 +228,7 @@ def test_meshes_with_an_albedo_need_its_module():
     assert [task.settings.get("mesh") for task in web.tasks(DESIGNS[1:], views)] == [None, None, "teapot"]
     served = web.tasks(DESIGNS, views)[-2:]
     assert [task.settings["methods"] for task in served] == [["quotient"], ["quotient"]]
-    assert [name for name, body in web_data.MESHES.items() if body.albedo] == ["colored", "textured"]
+    assert [name for name, body in web_meshes.MESHES.items() if body.albedo] == ["colored", "textured"]
 
 
 def test_files_of_the_site(site):
@@ -422,7 +422,7 @@ def test_command(tmp_path, monkeypatch, work, results, plain_section):
     modules = [task.settings for task in asked if task.function is web_data.module_of]
     plain = [{"method": method, "model": model} for method, model in DESIGNS]
     assert modules == [*plain, plain[0] | {"albedo": True}]
-    assert len(asked) - len(modules) == sum(body.views for body in web_data.MESHES.values())
+    assert len(asked) - len(modules) == sum(body.views for body in web_meshes.MESHES.values())
 
 
 @pytest.mark.parametrize(

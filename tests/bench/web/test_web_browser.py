@@ -7,7 +7,7 @@ import json
 import numpy as np
 import pytest
 
-from blysk.bench.web import web, web_data
+from blysk.bench.web import web, web_data, web_meshes
 from blysk.golden.frame_constants import FrameConstants, writes_of
 from blysk.golden.number.unit_vector import ONE
 from blysk.golden.reference.metrics import error_figures
@@ -217,7 +217,7 @@ def test_colours_and_textures(open_page, mesh):
     change(page, "mesh", mesh)
     state = state_of(page)
     assert (state["method"], state["model"], state["color"]) == ("quotient", "blinn", "#ffffff")
-    assert page.locator("#mesh-text").inner_text() == web_data.MESHES[mesh].text
+    assert page.locator("#mesh-text").inner_text() == web_meshes.MESHES[mesh].text
     for box, option in (("method", "linear"), ("model", "cosquad"), ("compare", "rival")):
         assert page.locator(f"#{box} option[value={option}]").is_disabled()
     image, run = natively(state)

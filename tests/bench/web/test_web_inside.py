@@ -12,7 +12,7 @@ from http.server import SimpleHTTPRequestHandler, ThreadingHTTPServer
 import numpy as np
 import pytest
 
-from blysk.bench.web import web_data
+from blysk.bench.web import web_data, web_meshes, web_spans
 from blysk.golden.frame_constants import writes_of
 from blysk.golden.frames.prepare import constants_of
 from blysk.sim.engines.beats import pack, unpack
@@ -85,7 +85,7 @@ def test_waveform_is_that_of_pysim(open_page, design):
     change(page, "mesh", mesh)
     use(page, *names)
     x, y = looked_at(page)
-    component = ObservedPipeline(web_data.design_of(*names, web_data.MESHES[mesh].albedo))
+    component = ObservedPipeline(web_data.design_of(*names, web_meshes.MESHES[mesh].albedo))
     inside, drive, status = traced(page, component)
     run = Interpreted(component).run(drive)
     own = slice(inside["start"], inside["start"] + inside["length"])
@@ -263,7 +263,7 @@ def test_page_stays_free_while_the_worker_simulates(open_page):
     assert len(page.workers) == 1
     _, _, frame = prepared(state_of(page))
     often = np.tile(np.arange(len(frame.spans)), 50)
-    data = web_data.encode(frame.spans[often], np.tile(frame.cut_raster.visible, 50))
+    data = web_spans.encode(frame.spans[often], np.tile(frame.cut_raster.visible, 50))
     script = """async data => {
         const bytes = await blysk.core.unpacked(data);
         await blysk.ask('spans', {name: 'long', bytes});

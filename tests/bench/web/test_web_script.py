@@ -10,7 +10,7 @@ from importlib import resources
 import numpy as np
 import pytest
 
-from blysk.bench.web import web_data
+from blysk.bench.web import web_data, web_spans
 from blysk.golden.frame_constants import writes_of
 from blysk.golden.frames.prepare import constants_of
 from blysk.golden.reference.albedo import fragment_albedo
@@ -164,8 +164,8 @@ def test_albedo_and_texels_are_those_of_python(mesh, monkeypatch):
         given={name: texture[name] for name in ("width", "height", "descriptor")},
         picture=unpacked(texture["picture"]),
         halves=unpacked(texture["halves"]),
-        bytes=list(zlib.decompress(web_data.encode(some, cut.visible[fragments]))),
-        columns=web_data.COLUMNS,
+        bytes=list(zlib.decompress(web_spans.encode(some, cut.visible[fragments]))),
+        columns=web_spans.COLUMNS,
         settings={**state, "color": [1, 1, 1], "light": [1, 1, 1]},
         viewer=scene.camera.viewer.tolist(),
         tables=web_data.tables(),
