@@ -6,6 +6,7 @@ between the ends, and normalises at every pixel.
 """
 
 from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import replace
 from statistics import median
 from typing import Any
 
@@ -17,6 +18,7 @@ from blysk.bench.svg import svg
 from blysk.bench.tools.families import DEVICE
 from blysk.bench.tools.fpga import name_of
 from blysk.golden.frames.triangle_frame import triangle_frame
+from blysk.golden.number.spans import LENGTH_BITS
 from blysk.golden.pipeline import ShadingPipeline
 from blysk.golden.presets import preset
 from blysk.golden.reference.scene import Scene
@@ -146,9 +148,14 @@ def _verdict(designs: Mapping[str, Any], rates: Mapping[str, Sequence[float]]) -
                 yield _beside(names, [designs[name] for name in names], rates)
 
 
+def _placed_name(design: str) -> str:
+    """Name of a candidate in the store. Designs are placed with the default words of places."""
+    return name_of(replace(CANDIDATES[design], x_bits=LENGTH_BITS, y_bits=LENGTH_BITS))
+
+
 def _beside(names: Sequence[str], pair: Sequence[Any], rates: Mapping[str, Sequence[float]]) -> str:
     """Cycles, time and multipliers of the second of two designs relative to the first."""
-    seeds = [rates.get(name_of(CANDIDATES[name]), ()) for name in names]
+    seeds = [rates.get(_placed_name(name), ()) for name in names]
     clocks = [median(of) for of in seeds] if all(seeds) else []
     words = []
     for own, rival in zip(*(of["frames"] for of in pair), strict=True):
@@ -175,7 +182,7 @@ def _table(designs: Mapping[str, Any], rates: Mapping[str, Sequence[float]]) -> 
     columns += ("pixels that show another triangle", "largest error, LSB")
     rows: list[tuple[Cell, ...]] = []
     for name, of in designs.items():
-        placed = rates.get(name_of(CANDIDATES[name]))
+        placed = rates.get(_placed_name(name))
         errors = [error for frame in of["frames"] for error in frame["errors"].values() if error is not None]
         rows.append(
             (

@@ -58,7 +58,7 @@ def test_no_frame_by_triangles_exceeds_its_bound(model):
         scene = _scene(rng)
         slivers = k == 0 and model == "blinn"
         if slivers:
-            mesh = teapot(10_000)
+            mesh = teapot(4_000)
             scene = replace(scene, mesh=mesh, camera=Camera.framing(mesh.vertices, (1, 2, 3)))
         design = preset("quotient", model, lights=len(scene.lights))
         renderer = Renderer(design.for_materials(scene.materials))
