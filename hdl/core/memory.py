@@ -18,6 +18,7 @@ from blysk.hdl.core.views import of_shape, require_same_shape
 __all__ = [
     "HEADED_FIFO_LATENCY",
     "LATE_FIFO_LATENCY",
+    "NEEDS_ZEROS",
     "UNCOUNTED",
     "clocked_reads",
     "connect_headed_fifo",
@@ -41,6 +42,10 @@ UNCOUNTED = 3
 """Largest number of payloads inside `connect_late_fifo` that its level does not count yet."""
 
 _CLOCKED: ContextVar[bool] = ContextVar("clocked", default=False)
+
+
+NEEDS_ZEROS = {"needs_zeros": 1}
+"""Attribute of a memory whose words are read before they are written. Verilog keeps their initial zeros."""
 
 
 @contextmanager

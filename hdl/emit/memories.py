@@ -1,9 +1,10 @@
 """Memories and multipliers of a netlist: initial zeros, and attributes for synthesis."""
 
+import json
 import re
 from typing import NamedTuple
 
-__all__ = ["SMALL", "with_attributes", "without_zeros"]
+__all__ = ["SMALL", "ZEROS_MARK", "with_attributes", "without_zeros"]
 
 SMALL = 64
 """Largest number of words of a memory that belongs into look-up tables."""
@@ -12,6 +13,10 @@ _PART = r"(?:  attribute [^\n]*\n)*  cell \{kind} \S+\n(?:    [^\n]*\n)*?  end\n
 _INITIAL, _WRITE = (re.compile(_PART.format(kind=kind)) for kind in (r"$meminit_v2", r"$memwr_v2"))
 _MEMORY = re.compile(r'^    parameter \\MEMID (".*")$', re.MULTILINE)
 _ZEROS = re.compile(r"^    connect \\DATA \d+'0+$", re.MULTILINE)
+ZEROS_MARK = "  attribute \\needs_zeros 1\n"
+"""Line of a netlist before a memory whose words are read before they are written."""
+
+_NEEDED = re.compile(re.escape(ZEROS_MARK) + r"  memory .* (\\\S+)$", re.MULTILINE)
 _ARRAY = re.compile(r"^  reg (?:\[\d+:0\] )?(\w+) \[(\d+):0\];$", re.MULTILINE)
 _WIRE = re.compile(r"^  (?:wire|reg) (?:signed )?(?:\[\d+:0\] )?(\w+);$", re.MULTILINE)
 _WRITTEN = re.compile(r"^\s+(\w+)\[.*\] <= ", re.MULTILINE)
@@ -47,7 +52,8 @@ _TOOLS = {
 def without_zeros(netlist: str) -> str:
     """A netlist in RTLIL without the initial zeros of memories that the netlist writes.
 
-    A table, which nothing writes, keeps its words. So does a written memory with a word other than 0.
+    A table, which nothing writes, keeps its words. So does a written memory with a word other than 0, and a
+    memory with the attribute ``needs_zeros``, whose words are read before they are written.
 
     Parameters
     ----------
@@ -58,6 +64,7 @@ def without_zeros(netlist: str) -> str:
     def strip(module: re.Match) -> str:
         text = module[0]
         written = {_MEMORY.search(cell[0])[1] for cell in _WRITE.finditer(text)}
+        written -= {json.dumps(name) for name in _NEEDED.findall(text)}
 
         def kept(cell: re.Match) -> str:
             return "" if _MEMORY.search(cell[0])[1] in written and _ZEROS.search(cell[0]) else cell[0]

@@ -14,7 +14,7 @@ from amaranth.lib import data, wiring
 from amaranth.lib.wiring import In, Out
 
 from blysk.hdl.core.memory import clocked_reads
-from blysk.hdl.emit.memories import with_attributes, without_zeros
+from blysk.hdl.emit.memories import ZEROS_MARK, with_attributes, without_zeros
 from blysk.hdl.emit.yosys import run_yosys
 
 __all__ = ["check_name", "emit", "port_widths"]
@@ -138,7 +138,7 @@ def emit(
     bits = _ports(component)
     with clocked_reads(memories == "synchronous"):
         netlist = rtlil.convert(_Flat(component, bits), name=name, emit_src=False)
-    given = netlist if zeros else without_zeros(netlist)
+    given = (netlist if zeros else without_zeros(netlist)).replace(ZEROS_MARK, "")
     text = with_attributes(_plain_identifiers(_yosys(given)), attributes)
     declared = _declared(name, text)
     declared_names = re.findall(r"\w+", declared[1])

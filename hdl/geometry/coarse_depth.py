@@ -12,6 +12,7 @@ from blysk.golden.geometry.depth_tester import DepthTester
 from blysk.golden.geometry.span_attributes import DEPTH_STEP, SPAN_DEPTH
 from blysk.golden.geometry.triangles import DEPTH
 from blysk.hdl.core.fixed import FixedShape
+from blysk.hdl.core.memory import NEEDS_ZEROS
 from blysk.hdl.core.stream import skid_buffer
 from blysk.hdl.core.views import copy, copy_fields
 
@@ -99,7 +100,7 @@ class CoarseDepthUnit(wiring.Component):
                 "tag": model.tag_bits,
             }
         )
-        m.submodules.words = memory = Memory(shape=word, depth=model.blocks, init=[])
+        m.submodules.words = memory = Memory(shape=word, depth=model.blocks, init=[], attrs=NEEDS_ZEROS)
         read, write = memory.read_port(), memory.write_port()
         tag, empty = Signal(model.tag_bits, name="tag"), Signal(name="empty")
         span, span_valid, swept, sweeping, held = self._pictures(m, tag, empty)

@@ -11,7 +11,7 @@ from blysk.golden.albedo.attribute_spans import AttributeSpans
 from blysk.golden.geometry.triangles import GRID, Grid
 from blysk.golden.geometry.vertex_sort import FACTOR_BITS, TESTED
 from blysk.golden.reference.scene import BACK_FACES
-from blysk.hdl.core.memory import registered_read
+from blysk.hdl.core.memory import NEEDS_ZEROS, registered_read
 from blysk.hdl.core.views import copy_fields
 from blysk.hdl.geometry.centre_test import misses_centres, near_bits
 from blysk.hdl.geometry.surface_words import placement_of
@@ -277,7 +277,8 @@ class VertexSortUnit(wiring.Component):
         layout = data.StructLayout(members | rest)
         triangle, bits = Signal(layout, name="triangle"), (WAITING_TRIANGLES - 1).bit_length()
         m.submodules.triangles = triangles = Memory(shape=layout.size, depth=1 << bits, init=[])
-        m.submodules.results = results = Memory(shape=bits + found.shape().size, depth=_KEPT, init=[])
+        shape = bits + found.shape().size
+        m.submodules.results = results = Memory(shape=shape, depth=_KEPT, init=[], attrs=NEEDS_ZEROS)
         written, kept = triangles.write_port(), results.write_port()
         head = results.read_port(domain="comb")
         free, decided, oldest = (Signal(bits, name=name) for name in ("free", "decided", "oldest"))

@@ -99,8 +99,8 @@ BUGS = {
     ),
     "a span that waits stops the one before it": (
         of_progress,
-        "moves.eq(skid_buffer(m, position, active, Cat(x, y, ends)))",
-        "moves.eq(skid_buffer(m, position, active, Cat(x, y, ends)) & ~self.coordinates.valid)",
+        "moves.eq(skid_buffer(m, position, active, Cat(x, y, ends, *further)))",
+        "moves.eq(skid_buffer(m, position, active, Cat(x, y, ends, *further)) & ~self.coordinates.valid)",
     ),
     "a pixel is overwritten": (of_colors, "m.If(advance)", "m.If(1)"),
 }
