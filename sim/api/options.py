@@ -387,7 +387,7 @@ BUILD: dict[str, Option] = {
     "memories": Option(
         Choice("kind of memories", MEMORIES),
         "asynchronous",
-        "synchronous: all memories are read at a clock edge, for FPGAs without memories in look-up tables "
+        "synchronous: memories are read at a clock edge, for FPGAs without memories in look-up tables "
         "(iCE40, MAX 10) and for chips. Pixels and cycles stay the same.",
     ),
     "zeros": Option(

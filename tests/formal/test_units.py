@@ -47,7 +47,7 @@ UNITS = {
     "line_accumulator": partial(LineAccumulatorUnit, RenormaliseInterpolator()),
 }
 KINDS = {name: getattr(make, "func", make) for name, make in UNITS.items()}
-SELDOM = ("geometry", "render", "pixel_pipelines", "motion")
+SELDOM = ("geometry", "render", "pixel_pipelines", "motion", "serial_vertex_sort")
 """Units whose proofs take minutes. Their parts are proved, and other tests run them."""
 SELDOM += OF_DOCUMENTS
 
