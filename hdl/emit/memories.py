@@ -4,18 +4,20 @@ import json
 import re
 from typing import NamedTuple
 
+from blysk.hdl.core.memory import NEEDS_ZEROS
+
 __all__ = ["SMALL", "ZEROS_MARK", "with_attributes", "without_zeros"]
 
 SMALL = 64
 """Largest number of words of a memory that belongs into look-up tables."""
 
+ZEROS_MARK = "".join(f"  attribute \\{name} {value}\n" for name, value in NEEDS_ZEROS.items())
+"""Line of a netlist before a memory whose words are read before they are written."""
+
 _PART = r"(?:  attribute [^\n]*\n)*  cell \{kind} \S+\n(?:    [^\n]*\n)*?  end\n"
 _INITIAL, _WRITE = (re.compile(_PART.format(kind=kind)) for kind in (r"$meminit_v2", r"$memwr_v2"))
 _MEMORY = re.compile(r'^    parameter \\MEMID (".*")$', re.MULTILINE)
 _ZEROS = re.compile(r"^    connect \\DATA \d+'0+$", re.MULTILINE)
-ZEROS_MARK = "  attribute \\needs_zeros 1\n"
-"""Line of a netlist before a memory whose words are read before they are written."""
-
 _NEEDED = re.compile(re.escape(ZEROS_MARK) + r"  memory .* (\\\S+)$", re.MULTILINE)
 _ARRAY = re.compile(r"^  reg (?:\[\d+:0\] )?(\w+) \[(\d+):0\];$", re.MULTILINE)
 _WIRE = re.compile(r"^  (?:wire|reg) (?:signed )?(?:\[\d+:0\] )?(\w+);$", re.MULTILINE)

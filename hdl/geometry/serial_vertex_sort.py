@@ -1,8 +1,7 @@
 """Vertex sort of the compact style: corners exchanged in turns, the area digit by digit."""
 
 from amaranth.hdl import Cat, Const, Module, Mux, Signal, Value, signed
-from amaranth.lib import data, stream, wiring
-from amaranth.lib.wiring import In, Out
+from amaranth.lib import data, wiring
 
 from blysk.golden.albedo.attribute_spans import AttributeSpans
 from blysk.golden.geometry.edge_setup import X_BITS
@@ -13,12 +12,9 @@ from blysk.hdl.geometry.surface_words import placement_of
 from blysk.hdl.geometry.triangles import (
     corners_shape,
     count_events,
-    counters_shape,
     first_centre,
-    frame_shape,
-    triangle_shape,
 )
-from blysk.hdl.geometry.vertex_sort import PAIRS, sorted_triangle_shape
+from blysk.hdl.geometry.vertex_sort import PAIRS, sort_members
 
 __all__ = ["SerialVertexSortUnit"]
 
@@ -65,14 +61,7 @@ class SerialVertexSortUnit(wiring.Component):
 
     def __init__(self, grid: Grid = GRID, surface: AttributeSpans | None = None):
         self.grid, self.surface = grid, surface
-        super().__init__(
-            {
-                "i": In(stream.Signature(triangle_shape(grid, surface))),
-                "o": Out(stream.Signature(sorted_triangle_shape(grid, surface))),
-                "constants": In(frame_shape()),
-                "status": Out(counters_shape("empty", "zero_area", "culled")),
-            }
-        )
+        super().__init__(sort_members(grid, surface))
 
     def elaborate(self, platform):
         """The steps and the counters."""

@@ -25,7 +25,7 @@ from blysk.hdl.geometry.triangles import (
     triangle_shape,
 )
 
-__all__ = ["PAIRS", "WAITING_TRIANGLES", "VertexSortUnit", "sorted_triangle_shape"]
+__all__ = ["PAIRS", "WAITING_TRIANGLES", "VertexSortUnit", "sort_members", "sorted_triangle_shape"]
 
 PAIRS = (0, 1), (1, 2), (0, 2)
 """Pairs of corners that are compared: whether the second corner comes before the first."""
@@ -48,6 +48,16 @@ def sorted_triangle_shape(grid: Grid = GRID, surface: AttributeSpans | None = No
     """Shape of `SortedTriangles.beats`: sorted corners, twice the area, the tag, place of the texture."""
     area = {"area": unsigned(2 * grid.bits)}
     return data.StructLayout(corners_shape(grid, surface) | area | tag_shape() | placement_of(surface))
+
+
+def sort_members(grid: Grid, surface: AttributeSpans | None) -> dict[str, wiring.Member]:
+    """Members of a vertex sort of any style, as `VertexSortUnit` has them."""
+    return {
+        "i": In(stream.Signature(triangle_shape(grid, surface))),
+        "o": Out(stream.Signature(sorted_triangle_shape(grid, surface))),
+        "constants": In(frame_shape()),
+        "status": Out(counters_shape("empty", "zero_area", "culled")),
+    }
 
 
 class VertexSortUnit(wiring.Component):
@@ -91,14 +101,7 @@ class VertexSortUnit(wiring.Component):
 
     def __init__(self, grid: Grid = GRID, surface: AttributeSpans | None = None):
         self.grid, self.surface = grid, surface
-        super().__init__(
-            {
-                "i": In(stream.Signature(triangle_shape(grid, surface))),
-                "o": Out(stream.Signature(sorted_triangle_shape(grid, surface))),
-                "constants": In(frame_shape()),
-                "status": Out(counters_shape("empty", "zero_area", "culled")),
-            }
-        )
+        super().__init__(sort_members(grid, surface))
 
     def elaborate(self, platform):
         """The pipeline, the memories and the counters."""

@@ -4,9 +4,14 @@ from functools import partial
 
 import numpy as np
 
-from blysk.bench.units.cosines.quotient_spans import any_vectors, line_directions
-from blysk.bench.units.operands import short_lengths, word_ends
-from blysk.bench.units.record import Case, Record, Stimulus, Variant
+from blysk.bench.units.cosines.quotient_spans import (
+    any_vectors,
+    extreme_words,
+    line_directions,
+    vector_case,
+)
+from blysk.bench.units.operands import short_lengths
+from blysk.bench.units.record import Record, Stimulus, Variant
 from blysk.golden.cosines.quotient_lanes import QuotientLanes
 from blysk.golden.cosines.quotient_spans import QuotientSpans, SpanVectors
 from blysk.hdl.cosines.quotient_lanes import QuotientLanesUnit
@@ -39,33 +44,19 @@ def _expect(unit, case):
     return found
 
 
-def _case(unit, vectors, length, constants):
-    beats = {**vectors._asdict(), "length": length}
-    return Case(beats, constants if unit.model.highlights else None)
-
-
 def _spans(unit, rng, count):
     """Spans, most of them short, and many of them pairs. Then 60 spans of one pixel fill the memory."""
     length = np.maximum(short_lengths(rng, count, 1) % (1 << unit.length_bits), 1)
     length = np.r_[np.where(rng.random(len(length)) < 0.2, 2, length), np.ones(60, dtype=np.int64)]
     vectors = vectors_with_pairs(rng, unit.model, length)
-    return _case(unit, vectors, length, line_directions(rng, unit.model.lights))
-
-
-def _words(unit, rng, count):
-    """Extreme codes in every component and light, with any steps and exponents. Sums wrap."""
-    length = np.maximum(rng.choice([1, 1, 1, 2, 3, 4, 5, 6, 7, 9, 40], count) % (1 << unit.length_bits), 1)
-    shape = count, len(unit.model.components)
-    start, step = (np.maximum(word_ends(rng, *shape), 1 - (1 << 17)) for _ in range(2))
-    vectors = SpanVectors(start, step, rng.integers(0, 16, count))
-    return _case(unit, vectors, length, word_ends(rng, unit.model.lights, 2))
+    return vector_case(unit, vectors, length, line_directions(rng, unit.model.lights))
 
 
 def _long_spans(unit, rng, count):
     """Spans of 3000 to 4095 pixels, where the last bits of differences change the words."""
     length = np.maximum(rng.integers(3000, 4096, 8) % (1 << unit.length_bits), 1)
     vectors = vectors_with_pairs(rng, unit.model, length)
-    return _case(unit, vectors, length, line_directions(rng, unit.model.lights))
+    return vector_case(unit, vectors, length, line_directions(rng, unit.model.lights))
 
 
 RECORD = Record(
@@ -83,7 +74,7 @@ RECORD = Record(
     expect=_expect,
     stimuli={
         "spans": Stimulus(_spans, 3000),
-        "words": Stimulus(_words, 500, repeats=4),
+        "words": Stimulus(extreme_words, 500, repeats=4),
         "long spans": Stimulus(_long_spans, stalled=False),
     },
     axis="",

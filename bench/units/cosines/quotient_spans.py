@@ -12,7 +12,7 @@ from blysk.golden.number.spans import pixels_of
 from blysk.hdl.cosines.quotient_spans import QuotientSpansUnit
 from blysk.sim.engines.beats import dtype_of
 
-__all__ = ["RECORD", "any_vectors", "line_directions", "pixel_word_beats"]
+__all__ = ["RECORD", "any_vectors", "extreme_words", "line_directions", "pixel_word_beats", "vector_case"]
 
 
 def any_vectors(
@@ -77,7 +77,8 @@ def _expect(unit, case):
     return pixel_word_beats(unit, pixels, pixels_of(beats["length"])[0])
 
 
-def _case(unit, vectors, length, constants):
+def vector_case(unit, vectors, length, constants):
+    """Spans of vectors for a unit, and the directions of its lights if it has highlights."""
     beats = {**vectors._asdict(), "length": length}
     return Case(beats, constants if unit.model.highlights else None)
 
@@ -86,23 +87,23 @@ def _spans(unit, rng, count):
     """Spans, most of them short. Vectors at the ends have length ratios to 2 and angles to 90 degrees."""
     length = np.maximum(short_lengths(rng, count, 1) % (1 << unit.length_bits), 1)
     vectors = any_vectors(rng, unit.model, length)
-    return _case(unit, vectors, length, line_directions(rng, unit.model.lights))
+    return vector_case(unit, vectors, length, line_directions(rng, unit.model.lights))
 
 
-def _words(unit, rng, count):
+def extreme_words(unit, rng, count):
     """Extreme codes in every component and light, with any steps and exponents. Sums wrap."""
     length = np.maximum(rng.choice([1, 1, 1, 2, 3, 4, 5, 6, 7, 9, 40], count) % (1 << unit.length_bits), 1)
     shape = count, len(unit.model.components)
     start, step = (np.maximum(word_ends(rng, *shape), 1 - (1 << 17)) for _ in range(2))
     vectors = SpanVectors(start, step, rng.integers(0, 16, count))
-    return _case(unit, vectors, length, word_ends(rng, unit.model.lights, 2))
+    return vector_case(unit, vectors, length, word_ends(rng, unit.model.lights, 2))
 
 
 def _long_spans(unit, rng, count):
     """Spans of 3000 to 4095 pixels, where the last bits of differences change the words."""
     length = np.maximum(rng.integers(3000, 4096, 8) % (1 << unit.length_bits), 1)
     vectors = any_vectors(rng, unit.model, length)
-    return _case(unit, vectors, length, line_directions(rng, unit.model.lights))
+    return vector_case(unit, vectors, length, line_directions(rng, unit.model.lights))
 
 
 def _measure(rng, count, model):
@@ -148,7 +149,7 @@ RECORD = Record(
     expect=_expect,
     stimuli={
         "spans": Stimulus(_spans, 3000),
-        "words": Stimulus(_words, 500, repeats=4),
+        "words": Stimulus(extreme_words, 500, repeats=4),
         "long spans": Stimulus(_long_spans, stalled=False),
     },
     axis="pixels of the span",
