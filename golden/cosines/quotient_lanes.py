@@ -107,9 +107,8 @@ class QuotientLanes(QuotientSpans):
             mask = present.reshape(present.shape + (1,) * (codes.ndim - 1))
             return np.where(mask, codes[index], 0)
 
-        words = PixelWords(
-            *(Fixed(word.format, arranged(word.codes)) for word in pixels[:3]), arranged(pixels.away) != 0
-        )
+        numerator, rest, line = (Fixed(word.format, arranged(word.codes)) for word in pixels[:3])
+        words = PixelWords(numerator, rest, line, arranged(pixels.away) != 0)
         return words, present, span
 
 

@@ -45,10 +45,10 @@ def lines_along(raster: Raster, span: np.ndarray, t: np.ndarray) -> np.ndarray:
 
 def line_ends(raster: Raster, span: np.ndarray | None = None) -> tuple[np.ndarray, np.ndarray]:
     """Normals with their lengths at the two ends of all or some spans, each of shape (spans, 3)."""
-    ends = (raster.magnitude_left, raster.normal_left), (raster.magnitude_right, raster.normal_right)
+    ends = [(raster.magnitude_left, raster.normal_left), (raster.magnitude_right, raster.normal_right)]
     if span is not None:
         # `take` of rows takes a third of the time of an index.
-        ends = tuple((of.take(span), normal.take(span, axis=0)) for of, normal in ends)
+        ends = [(of.take(span), normal.take(span, axis=0)) for of, normal in ends]
     left, right = (of[:, np.newaxis] * normal for of, normal in ends)
     return left, right
 

@@ -135,6 +135,9 @@ def clipped_triangles(
         first, second, third = values[:, shown]
         return np.stack((first, np.where(turned, third, second), np.where(turned, second, third)))
 
+    if corner is not None:
+        corner = corner[shown]
+        corner[turned] = corner[turned][:, [0, 2, 1]]
     x, y = turn(x), turn(y)
     half = SUBPIXELS // 2
     start, end = [1, 2, 0], [2, 0, 1]
@@ -151,9 +154,7 @@ def clipped_triangles(
         weight=turn(weight),
         nearness=turn(nearness),
         turned=turned,
-        corner=corner if corner is None else corner[shown],
+        corner=corner,
         triangle=triangle[shown],
     )
-    if corner is not None:
-        pieces.corner[turned] = pieces.corner[turned][:, [0, 2, 1]]
     return pieces, left_over, triangle[solid]
