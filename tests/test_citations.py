@@ -29,6 +29,7 @@ ANCHORS = {
     "forward-differences angular-method arccos half-chord recurrence renormaliser true-spans",
     "chord.md": "the-chord differences error-bound where-spans-are-cut local-lights",
     "quotient.md": "frame identities span pixel bound counted",
+    "rivals.md": "words six-points duff bishop-and-weimer loisel abbas",
     "bus.md": "streams registers",
     "bounds.md": "bisection middle-normal recurrence gate-of-unit-normals lobe-tables specular-terms",
     "video.md": "vertices bands display tmds",

@@ -110,6 +110,19 @@ class Quotient:
         base = np.minimum(left + (middle - (left + right) / 2) / 2 + half, 1 - format.step)
         return Fixed.round(format, base), Fixed.round(self.SLOPE_FORMAT, left - right)
 
+    def word(self, name: str, codes: np.ndarray) -> np.ndarray:
+        """Codes of a word of the datapath. A subclass may record the word, or cut it short.
+
+        Parameters
+        ----------
+        name : str
+            ``m``, ``w``, ``q``, ``q shifted``, ``slope`` (the product with the table's slope), ``r``,
+            ``r^2``, ``line``, ``N·L``, ``numerator``, ``s`` or ``place``.
+        codes : int64 array
+            The codes. ``m``, ``line``, ``N·L``, ``numerator``, ``s`` and ``place`` have an axis of lights.
+        """
+        return codes
+
     def root(self, square: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Bit-accurate reciprocal root.
 
@@ -128,12 +141,13 @@ class Quotient:
         shift = np.full(square.shape, self.SHIFTS)
         for k in reversed(range(self.SHIFTS)):
             shift[square >> (34 - 2 * k) > 0] = k
-        normal = (square << (2 * shift)) >> 15
+        normal = self.word("q shifted", (square << (2 * shift)) >> 15)
         fraction_bits = 21 - self.TABLE_BITS
         entry, fraction = normal >> fraction_bits, normal & ((1 << fraction_bits) - 1)
         base, slope = (word.codes for word in self.table)
-        root = (base[entry] - ((slope[entry] * fraction) >> fraction_bits)) >> 2
-        return np.minimum(root, self.ROOT_FORMAT.max_code), shift, square >> 20 == 0
+        way = self.word("slope", (slope[entry] * fraction) >> fraction_bits)
+        root = np.minimum((base[entry] - way) >> 2, self.ROOT_FORMAT.max_code)
+        return self.word("r", root), shift, square >> 20 == 0
 
     def compute(self, pixels: PixelWords) -> tuple[Fixed, Fixed, np.ndarray]:
         """Bit-accurate N·L and places of s of every pixel.
@@ -153,15 +167,18 @@ class Quotient:
             Whether q is too small.
         """
         cut = self.PIXEL_FRACTION
-        numerator, rest = pixels.numerator.truncate(cut).codes, pixels.rest.truncate(cut).codes
+        numerator = self.word("m", pixels.numerator.truncate(cut).codes)
+        rest = self.word("w", pixels.rest.truncate(cut).codes)
         whole = cut - 34
         square = (rest >> whole) + (numerator[:, 0] >> whole if self.spans.highlights else 0)
-        square &= (1 << 36) - 1
+        square = self.word("q", square & (1 << 36) - 1)
         root, shift, too_small = self.root(square)
         root, shift = root[:, np.newaxis], shift[:, np.newaxis]
         line = (pixels.line.codes << shift) >> (self.spans.LINE_FORMAT.width - self.LINE_FORMAT.width)
-        cosine = Fixed(self.LINE_FORMAT, self.LINE_FORMAT.wrap(line)) * Fixed(self.ROOT_FORMAT, root)
+        line = self.word("line", self.LINE_FORMAT.wrap(line))
+        cosine = Fixed(self.LINE_FORMAT, line) * Fixed(self.ROOT_FORMAT, root)
         cosine = cosine.truncate(self.COSINE_FORMAT.fraction_bits)
+        cosine = Fixed(cosine.format, self.word("N·L", cosine.codes))
         past = (self.parts * (OCTAVES + 1) * STEPS) << FRACTION_BITS
         if not self.spans.highlights:
             return cosine, Fixed(self.place_format, np.full(line.shape, past)), too_small
@@ -169,7 +186,7 @@ class Quotient:
         exact = SQ(2, cut).wrap((rest + numerator[:, 0])[:, np.newaxis] - numerator)
         second = self._second(numerator, exact)
         chosen = np.maximum(np.where(second, exact, numerator), 0)
-        place = self._place(chosen, (root * root) >> 17, shift)
+        place = self._place(chosen, self.word("r^2", (root * root) >> 17), shift)
         dark = pixels.away | (place >= (OCTAVES << 16 if self.spans.mirror else 16 << 16))
         place = np.where(dark, past, place + (second << 20))
         return cosine, Fixed(self.place_format, place), too_small
@@ -186,7 +203,7 @@ class Quotient:
         group = np.full(chosen.shape, self.GROUPS)
         for k in reversed(range(self.GROUPS)):
             group[chosen >> (38 - 4 * k) > 0] = k
-        product = ((chosen << (4 * group)) >> 25) * square_root
+        product = self.word("s", self.word("numerator", (chosen << (4 * group)) >> 25) * square_root)
         # The product has 34 bits; s is product 2^-34 2^(2 + 2 shift - 4 group).
         zeros = np.full(chosen.shape, 7)
         for k in reversed(range(7)):
@@ -197,4 +214,4 @@ class Quotient:
         # Below the octaves the leading 1 is a part of the position, too.
         low = np.minimum(np.maximum(octave - OCTAVES + 1, 0), 17)
         place = np.where(octave < OCTAVES, (row << 16) + (mantissa & 0xFFFF), mantissa >> low)
-        return np.where(octave < 0, 1 << 20, place)
+        return self.word("place", np.where(octave < 0, 1 << 20, place))
