@@ -6,6 +6,7 @@ from dataclasses import replace
 import click
 
 from blysk.bench.tools.defaults import SEEDS
+from blysk.bench.tools.device_names import DEVICE_NAMES
 from blysk.bench.tools.families import DEVICES, ECP5, ECP5_85F
 from blysk.sim.api.design import built, design
 from blysk.sim.api.options import BUILD, DESIGN, NEEDS
@@ -33,6 +34,13 @@ _DESIGN = DESIGN | {"transfer": DESIGN["transfer"]._replace(default="linear")}
     help="Family of FPGAs. "
     + "; ".join(f"{name}: {family.device}" for name, family in DEVICES.items())
     + ".  [default: ecp5; for several pipelines ecp5-85f]",
+)
+@click.option(
+    "--device",
+    "devices",
+    multiple=True,
+    type=Choice("device", (*DEVICE_NAMES, "all")),
+    help="Print the parts of this kind of FPGA by Yosys alone, without placement. Repeat for more.",
 )
 @click.option("--every-method", is_flag=True, help="Place the pipeline of every method.")
 @click.option(
@@ -77,6 +85,7 @@ _DESIGN = DESIGN | {"transfer": DESIGN["transfer"]._replace(default="linear")}
 def command(
     context,
     family_name,
+    devices,
     every_method,
     units,
     target,
@@ -118,6 +127,13 @@ def command(
         raise InputError(option, "is for the pipeline", f"leave out {option} or --unit")
     if every_method and "method" in given:
         raise InputError("--method", "every method is placed", "leave out --method or --every-method")
+    if devices and (
+        placing := given_options(
+            context, ["family_name", "target", "seeds", "jobs", "by_unit", "keep_registers"]
+        )
+    ):
+        option = f"--{next(iter(placing)).removesuffix('_name').replace('_', '-')}"
+        raise InputError(option, "a --device is mapped by Yosys alone", f"leave out {option} or --device")
     if by_unit and (placing := given_options(context, ["target", "seeds", "jobs"])):
         raise InputError(
             f"--{next(iter(placing))}", "nothing is placed", "leave it out, or leave out --by-unit"
@@ -141,6 +157,13 @@ def command(
 
     designs = list(units_of(units) if units else pipelines_of(chosen, every_method, build))
     clocked = build.get("memories") == "synchronous"
+    if devices:
+        from blysk.bench.tools.devices import map_devices
+
+        map_devices(
+            designs, list(DEVICE_NAMES if "all" in devices else dict.fromkeys(devices)), clocked, figures
+        )
+        return
     # Report a missing tool before the work.
     about(family)
     with clocked_reads(clocked):
