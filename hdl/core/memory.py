@@ -4,14 +4,14 @@ Some FPGAs and chips read a memory at a clock edge only. Within `clocked_reads` 
 make these reads. Each word comes in the same cycle as without `clocked_reads`.
 """
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from contextvars import ContextVar
 from typing import Any
 
 from amaranth.hdl import Cat, Module, Mux, Shape, Signal, Value, ValueLike
 from amaranth.lib import stream
-from amaranth.lib.memory import Memory, WritePort
+from amaranth.lib.memory import Memory, ReadPort, WritePort
 
 from blysk.hdl.core.views import of_shape, require_same_shape
 
@@ -27,8 +27,12 @@ __all__ = [
     "delayed",
     "first_in_turn",
     "pass_beside",
+    "read_address",
+    "read_domain",
+    "read_options",
     "registered_read",
     "turn_of",
+    "word_in_register",
     "words_in_turn",
 ]
 
@@ -64,14 +68,42 @@ def clocked_reads(wanted: bool = True) -> Iterator[None]:
         _CLOCKED.reset(token)
 
 
-def _reads(memory: Memory) -> dict[str, Any]:
-    """Options of a read port for an address in a register. A clocked port sees a write at its edge."""
-    return {"transparent_for": memory.write_ports} if _CLOCKED.get() else {"domain": "comb"}
+def read_options(memory: Memory) -> dict[str, Any]:
+    """Options of a read port for an address in a register, see `read_address`.
+
+    A clocked port gives a word that is written at its edge. ``memory`` has its write ports already.
+    """
+    return {"transparent_for": memory.write_ports} if _CLOCKED.get() else {"domain": read_domain()}
 
 
-def _place(address: Value, following: Value) -> Value:
-    """Address of a port with `_reads`: a register, or its next value, which a clocked read needs."""
+def read_address(address: Value, following: Value) -> Value:
+    """Address of a port with `read_options`: a register, or its next value, which a clocked read needs."""
     return following[: len(address)] if _CLOCKED.get() else address
+
+
+def read_domain() -> str:
+    """Domain of a read port whose word goes into a register, see `word_in_register`."""
+    return "sync" if _CLOCKED.get() else "comb"
+
+
+def word_in_register(m: Module, port: ReadPort, wanted: Value, register: Callable[[Value], Value]) -> Value:
+    """Word of a read port of `read_domain`, in the cycle after its address.
+
+    Parameters
+    ----------
+    m : Module
+        Module of the memory.
+    port : ReadPort
+        The port. The caller connects its address.
+    wanted : Value
+        Whether a new word is taken.
+    register : callable
+        Makes a register of the word, with the enable ``wanted``. A clocked port is the register itself.
+    """
+    if not _CLOCKED.get():
+        return register(port.data)
+    m.d.comb += port.en.eq(wanted)
+    return port.data
 
 
 def words_in_turn(m: Module, name: str, word: ValueLike, written: Value, depth: int) -> Memory:
@@ -109,7 +141,7 @@ def first_in_turn(m: Module, memory: Memory, taken: Value) -> Value:
     taken : Value
         Whether the first word is taken.
     """
-    read = memory.read_port(**_reads(memory))
+    read = memory.read_port(**read_options(memory))
     if not _CLOCKED.get():
         with m.If(taken):
             m.d.sync += read.addr.eq(read.addr + 1)
@@ -145,12 +177,12 @@ def pass_beside(m: Module, name: str, word: ValueLike, written: Value, taken: Va
     """
     bits = (depth - 1).bit_length()
     words = words_in_turn(m, name, word, written, 1 << bits)
-    first, second = (words.read_port(**_reads(words)) for _ in range(2))
+    first, second = (words.read_port(**read_options(words)) for _ in range(2))
     address, following = Signal(bits, name=f"{name}_address"), Signal(bits, name=f"{name}_following", init=1)
     leaves = Signal(len(Value.cast(word)), name=f"{name}_leaves", reset_less=True)
     m.d.comb += [
-        first.addr.eq(_place(address, Mux(taken, following, address))),
-        second.addr.eq(_place(following, following + taken)),
+        first.addr.eq(read_address(address, Mux(taken, following, address))),
+        second.addr.eq(read_address(following, following + taken)),
     ]
     with m.If(taken):
         m.d.sync += [address.eq(following), following.eq(following + 1)]
@@ -192,7 +224,7 @@ def registered_read(
     moves : Value
         Whether the registers take new words.
     """
-    port = memory.read_port(domain="sync" if _CLOCKED.get() else "comb")
+    port = memory.read_port(domain=read_domain())
     moves = wanted if write is None else wanted & ~(write.en & (write.addr == address))
     read, word = (Signal(len(port.data), name=name, reset_less=True) for name in ("read", "word"))
     m.d.comb += port.addr.eq(address)
@@ -239,7 +271,7 @@ def delayed(m: Module, name: str, value: Value, cycles: int, turn: Value) -> Sig
     """
     m.submodules[name] = memory = Memory(shape=len(Value.cast(value)), depth=cycles - 1, init=[])
     word = Signal(value.shape(), name=name, reset_less=True)
-    write, read = memory.write_port(), memory.read_port(domain="sync" if _CLOCKED.get() else "comb")
+    write, read = memory.write_port(), memory.read_port(domain=read_domain())
     m.d.comb += [
         write.addr.eq(turn),
         write.data.eq(value),
@@ -340,7 +372,7 @@ def connect_wide_fifo(
     width = Shape.cast(source.payload.shape()).width
     bits = (depth - 1).bit_length()
     m.submodules[name] = memory = Memory(shape=width, depth=1 << bits, init=[])
-    write, read = memory.write_port(), memory.read_port(**_reads(memory))
+    write, read = memory.write_port(), memory.read_port(**read_options(memory))
     first, free = (Signal(bits, name=f"{name}_{word}") for word in ("first", "free"))
     room, some = Signal(name=f"{name}_room", init=1), Signal(name=f"{name}_some")
     level, following = (Signal(range(depth + 1), name=f"{name}_{word}") for word in ("level", "following"))
@@ -350,7 +382,7 @@ def connect_wide_fifo(
         sink.valid.eq(some),
         write.data.eq(source.payload),
         write.addr.eq(free),
-        read.addr.eq(_place(first, first + goes)),
+        read.addr.eq(read_address(first, first + goes)),
         # A word written without a payload is overwritten later.
         write.en.eq(room),
         Value.cast(sink.payload).eq(read.data),
@@ -407,12 +439,12 @@ def connect_headed_fifo(
     for port, value in ((memory.write_port(), source.payload), (heads.write_port(), head)):
         # A word written without a payload is overwritten later.
         m.d.comb += [port.data.eq(value), port.addr.eq(free), port.en.eq(room)]
-    read, of_heads = memory.read_port(**_reads(memory)), heads.read_port(**_reads(heads))
+    read, of_heads = memory.read_port(**read_options(memory)), heads.read_port(**read_options(heads))
     m.d.comb += [
         source.ready.eq(room),
         sink.valid.eq(some),
-        read.addr.eq(_place(first, first + goes)),
-        of_heads.addr.eq(_place(ahead, ahead + fetches)),
+        read.addr.eq(read_address(first, first + goes)),
+        of_heads.addr.eq(read_address(ahead, ahead + fetches)),
         Value.cast(sink.payload).eq(read.data),
         fetches.eq((free != ahead) & (~some | sink.ready)),
     ]

@@ -2,12 +2,13 @@
 
 from amaranth.hdl import Array, Cat, Module, Mux, Signal, Value
 from amaranth.lib import data, stream, wiring
-from amaranth.lib.memory import Memory
+from amaranth.lib.memory import Memory, ReadPort
 from amaranth.lib.wiring import In, Out
 
 from blysk.golden.frame_constants import LIGHT_STRIDE
 from blysk.golden.geometry.light_adapter import LightAdapter
 from blysk.hdl.core.fixed import FixedShape
+from blysk.hdl.core.memory import read_domain, word_in_register
 from blysk.hdl.core.views import copy
 from blysk.hdl.frame_constants import write_shape
 from blysk.hdl.geometry.vector_adapter import vector_spans_shape
@@ -120,6 +121,10 @@ class LightAdapterUnit(wiring.Component):
                 m.d.sync += signal.eq(value)
             return signal
 
+        def in_register(port, name):
+            word = word_in_register(m, port, advance, lambda data: register(data.as_signed(), name))
+            return word.as_signed()
+
         # In a span of one pixel the step has no meaning, and the start takes its place.
         single = ~given.length[1:].any()
         start, step = (
@@ -146,9 +151,9 @@ class LightAdapterUnit(wiring.Component):
                         m.d.sync += of_step.eq(~of_step)
             # The low bits of a light's number that distinguish all lights.
             place = Cat(axis, row, light[: (self.lights - 1).bit_length()])
-            code = self._axes(m, "axes", place, of_axes & (of_light > 0) & (of_light <= self.lights))
+            axes = self._axes(m, "axes", place, of_axes & (of_light > 0) & (of_light <= self.lights))
             vector = register(Mux(of_step, step, start).as_signed(), "vector")
-            product = register(vector * register(code, "code"), "product")
+            product = register(vector * in_register(axes, "code"), "product")
             chain = [self._sum(m, advance, product, begins, "sum")]
             done = ends_row
             for stage in range(1, 4):
@@ -164,8 +169,8 @@ class LightAdapterUnit(wiring.Component):
             for light in range(1, self.lights + 1):
                 for row in range(self.rows):
                     chosen = of_axes & (of_light == light) & (address[2:_LOW] == row)
-                    code = self._axes(m, f"axes_{light}_{row}", axis, chosen)
-                    codes.append(register(code, f"code_{light}_{row}"))
+                    axes = self._axes(m, f"axes_{light}_{row}", axis, chosen)
+                    codes.append(in_register(axes, f"code_{light}_{row}"))
             sums = []
             for vector, name in zip(vectors, ("start", "step"), strict=True):
                 for k, code in enumerate(codes):
@@ -181,18 +186,18 @@ class LightAdapterUnit(wiring.Component):
         m.d.comb += [Value.cast(result[name]).eq(word) for name, word in words.items()]
         return m
 
-    def _axes(self, m: Module, name: str, place: Value, chosen: Value) -> Value:
-        """Code of an entry in a memory of axes. ``chosen`` tells whether a write is for this memory."""
+    def _axes(self, m: Module, name: str, place: Value, chosen: Value) -> ReadPort:
+        """Read port of a memory of axes. ``chosen`` tells whether a write is for this memory."""
         write, width = self.write, LightAdapter.FORMAT.width
         m.submodules[name] = memory = Memory(shape=width, depth=1 << len(place), init=[])
-        writes, reads = memory.write_port(), memory.read_port(domain="comb")
+        writes, reads = memory.write_port(), memory.read_port(domain=read_domain())
         m.d.comb += [
             writes.addr.eq(write.payload.address),
             writes.data.eq(write.payload.data),
             writes.en.eq(write.valid & chosen),
             reads.addr.eq(place),
         ]
-        return reads.data.as_signed()
+        return reads
 
     @staticmethod
     def _sum(m: Module, advance: Value, product: Value, begins: Value, name: str) -> Value:

@@ -11,7 +11,7 @@ from blysk.golden.albedo.attribute_spans import AttributeSpans
 from blysk.golden.geometry.triangles import GRID, Grid
 from blysk.golden.geometry.vertex_sort import FACTOR_BITS, TESTED
 from blysk.golden.reference.scene import BACK_FACES
-from blysk.hdl.core.memory import NEEDS_ZEROS, registered_read
+from blysk.hdl.core.memory import NEEDS_ZEROS, read_address, read_options, registered_read
 from blysk.hdl.core.views import copy_fields
 from blysk.hdl.geometry.centre_test import misses_centres, near_bits
 from blysk.hdl.geometry.surface_words import placement_of
@@ -283,15 +283,15 @@ class VertexSortUnit(wiring.Component):
         shape = bits + found.shape().size
         m.submodules.results = results = Memory(shape=shape, depth=_KEPT, init=[], attrs=NEEDS_ZEROS)
         written, kept = triangles.write_port(), results.write_port()
-        head = results.read_port(domain="comb")
+        head = results.read_port(**read_options(results))
         free, decided, oldest = (Signal(bits, name=name) for name in ("free", "decided", "oldest"))
         behind, first, level = (Signal.like(kept.addr, name=name) for name in ("behind", "first", "level"))
-        slot, some = head.data[:bits], level != 0
+        slot, some, reads = head.data[:bits], level != 0, Signal(name="reads")
         m.d.comb += [
             *copy_fields(triangle, given),
             *(written.addr.eq(free), written.data.eq(triangle), written.en.eq(takes)),
             *(kept.addr.eq(behind), kept.data.eq(Cat(decided, found)), kept.en.eq(decides & drawn)),
-            *(head.addr.eq(first), level.eq(behind - first)),
+            *(head.addr.eq(read_address(first, first + reads)), level.eq(behind - first)),
         ]
         # Levels are one cycle old.
         m.d.sync += [
@@ -301,7 +301,7 @@ class VertexSortUnit(wiring.Component):
             room.eq((free - oldest)[:bits] < WAITING_TRIANGLES - _RESERVED),
         ]
 
-        read, offered, reads = Signal(name="read"), Signal(name="offered"), Signal(name="reads")
+        read, offered = Signal(name="read"), Signal(name="offered")
         wanted = ~offered | self.o.ready
         word, steps = registered_read(m, triangles, slot, wanted, written)
         # ``reads`` implies ``steps``, because the slot of a waiting triangle is not written.

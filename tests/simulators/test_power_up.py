@@ -28,7 +28,14 @@ CASES = {
 }
 """Beats or pixels of each unit. The registers of other structures are of the same kinds."""
 
-CLOCKED = (("pipeline", "quotient, blinn"), ("pipeline", "compact"), ("render", "quotient, compact"))
+CLOCKED = (
+    ("pipeline", "quotient, blinn"),
+    ("pipeline", "compact"),
+    ("geometry", "two lanes"),
+    ("geometry", "compact"),
+    ("render", "quotient"),
+    ("render", "quotient, compact"),
+)
 """Units whose text is also tested with memories that are read at clock edges."""
 
 QUICK = ("pipeline", "linear, cosquad")

@@ -15,6 +15,11 @@ from amaranth.lib.memory import Memory
 from amaranth.lib.wiring import In, Out
 from amaranth.sim import Simulator
 
+from blysk.bench.units.record import length_of
+from blysk.bench.units.registry import RECORDS
+from blysk.golden.build import STYLES
+from blysk.golden.presets import METHODS, preset
+from blysk.hdl.bus.bus import core_of
 from blysk.hdl.core.memory import (
     UNCOUNTED,
     clocked_reads,
@@ -28,6 +33,9 @@ from blysk.hdl.core.memory import (
     turn_of,
     words_in_turn,
 )
+from blysk.sim.engines.simulate import simulate
+
+from ...checks import assert_beats_equal
 
 
 @pytest.mark.parametrize("depth", [1, 2, 3, 12])
@@ -126,3 +134,41 @@ def test_reads_at_clock_edges_change_no_cycle():
     simulator.add_testbench(drive)
     simulator.run()
     assert min(seen.values()) > 50
+
+
+@pytest.mark.parametrize(
+    ("name", "variant"),
+    [
+        ("vertex_sort", ""),
+        pytest.param("light_adapter", "", marks=[pytest.mark.long, pytest.mark.ci]),
+        pytest.param("light_adapter", "serial", marks=pytest.mark.long),
+    ],
+)
+def test_units_with_reads_of_their_own(name, variant):
+    """Units that read memories without the functions of a FIFO. Reads at clock edges change no cycle."""
+    record, rng = RECORDS[name], np.random.default_rng(2026)
+    make = record.variants[variant].unit
+    case = next(iter(record.stimuli_of(variant).values())).make(make(), rng, 40)
+    expected = record.expect(make(), case)
+    stalls = {side: rng.random(509) < 0.4 for side in ("input_stalls", "output_stalls")}
+    found = []
+    for clocked in (False, True):
+        with clocked_reads(clocked):
+            unit = make()
+            found.append(
+                simulate(unit, case.beats, count=length_of(expected), engine="pysim", **case.sent, **stalls)
+            )
+            netlist = rtlil.convert(make(), name="top", emit_src=False)
+        assert ("parameter \\CLK_ENABLE 0" in netlist) == (not clocked)
+    assert_beats_equal(found[1].beats, expected)
+    np.testing.assert_array_equal(found[0].cycles, found[1].cycles)
+    np.testing.assert_array_equal(found[0].input_cycles, found[1].input_cycles)
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("style", STYLES)
+@pytest.mark.parametrize("method", METHODS)
+def test_every_method_reads_at_clock_edges(method, style):
+    unit = core_of(preset(method, style=style))
+    with clocked_reads():
+        assert "parameter \\CLK_ENABLE 0" not in rtlil.convert(unit, name="top", emit_src=False)
