@@ -53,5 +53,6 @@ OF_DOCUMENTS = (
 WHOLE = (
     *("geometry", "render", "pixel_pipelines", "framing", "registers", "serialiser", "motion"),
     *("draw_commands", "mesh_memory", "vertex_unit", "triangle_assembly", "tmds_encoder"),
+    *("packet_decoder", "uart_receiver"),
 )
 """Units that are no parts of geometry or of pipelines."""

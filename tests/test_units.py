@@ -39,7 +39,7 @@ SELDOM = (
     *("attribute_spans", "attributes", "albedo"),
     *("vector_adapter", "halfway_vector", "mirror_adapter", "light_adapter", "coarse_depth", "depth_tester"),
     *("motion", "draw_commands", "mesh_memory", "vertex_unit", "triangle_assembly", "tmds_encoder"),
-    "quotient_lanes",
+    *("packet_decoder", "uart_receiver", "quotient_lanes"),
 )
 """Units that the default design does not have: other methods and models, renderer, buses and boards.
 

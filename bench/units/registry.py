@@ -6,8 +6,8 @@ These components have no record:
   output stream ``o``. The records of the pipelines cover these components as parts of the pipelines;
 - the accumulator of ``chord-local``. The record of the interpolator covers it as a part of the interpolator;
 - the pixel lanes. Their beats depend on the cycles, so they have tests of their own;
-- units with other ports: band depths, controls, the draw unit, and units of the display that have two clocks
-  or never wait. They have tests of their own.
+- units with other ports: band depths, controls, the draw unit, the loader and its flash reader, and units of
+  the display that have two clocks or never wait. They have tests of their own.
 """
 
 from importlib import import_module
