@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from blysk.golden.frame_constants import FrameConstants, writes_of
-from blysk.golden.video.mesh_memory import MeshMemory
+from blysk.golden.video.mesh_memory import BLOCK_WORDS, MeshMemory, block_rams
 
 __all__ = ["COMMAND_BITS", "KINDS", "DrawCommands"]
 
@@ -126,6 +126,32 @@ class DrawCommands:
             ]
             rows.append([KINDS.index("end"), 0, 0, 0])
         return cls(np.array(rows, dtype=np.int64), tuple(starts))
+
+    @property
+    def longest(self) -> int:
+        """Number of commands of the longest list."""
+        return max(len(self.compute(start, True)) for start in self.starts)
+
+    @property
+    def room(self) -> int:
+        """Most commands of a list in as many block RAMs as the lists take."""
+        blocks = block_rams(len(self.words), COMMAND_BITS)
+        return max(blocks * BLOCK_WORDS // len(self.starts), self.longest)
+
+    def padded(self, room: int) -> "DrawCommands":
+        """The same lists, each followed by ``end`` up to a number of commands.
+
+        Raises
+        ------
+        ValueError
+            If a list is longer.
+        """
+        if self.longest > room:
+            raise ValueError(f"a list of {self.longest:,} commands does not fit a memory for {room:,}")
+        end = np.array([[KINDS.index("end"), 0, 0, 0]])
+        lists = [self.compute(start, True) for start in self.starts]
+        rows = [row for words in lists for row in (words, end.repeat(room - len(words), axis=0))]
+        return DrawCommands(np.concatenate(rows), tuple(range(0, room * len(lists), room)))
 
     @property
     def codes(self) -> list[int]:

@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
+from typing import NamedTuple
 
 import numpy as np
 
@@ -20,10 +21,26 @@ from blysk.golden.video.motion import Motion, rotation
 from blysk.golden.video.triangle_assembly import TriangleAssembly
 from blysk.golden.video.vertex_unit import ScreenVertices, VertexTransform
 
-__all__ = ["BandPixels", "Drawing", "board_design", "turned"]
+__all__ = ["BandPixels", "Drawing", "Room", "board_design", "turned"]
 
 _SHORTER = 1 - 2.0**-11
 """Length of axes with several lights. So no normal is longer than 1 after the matrix's roundings."""
+
+
+class Room(NamedTuple):
+    """Words that the memories of a drawing have room for.
+
+    Parameters
+    ----------
+    vertices, triangles : int
+        Vertices and triangles of the mesh memory.
+    commands : int
+        Commands of each list.
+    """
+
+    vertices: int
+    triangles: int
+    commands: int
 
 
 @dataclass(frozen=True)
@@ -201,6 +218,29 @@ class Drawing:
             controls=controls or Controls(materials=len(scenes)),
             lines=lines,
             transform=transform,
+        )
+
+    @property
+    def room(self) -> Room:
+        """The largest room in as many block RAMs as the memories take. Padded to it, a drawing keeps it."""
+        return Room(*self.mesh.largest_room(self.assembly.screen_bits), self.commands.room)
+
+    def padded(self, room: Room) -> "Drawing":
+        """The same drawing with memories of a given room.
+
+        Two padded drawings of the same design, with the same room, background and treatment of back faces,
+        differ in nothing but the words of memories. Each takes as many matrices as a block RAM holds.
+
+        Raises
+        ------
+        ValueError
+            If the room is too small.
+        """
+        return replace(
+            self,
+            mesh=replace(self.mesh, room=(room.vertices, room.triangles)),
+            motion=self.motion.padded(Motion.ROOM),
+            commands=self.commands.padded(room.commands),
         )
 
     @property

@@ -12,12 +12,13 @@ from blysk.golden.number.unit_vector import COMPONENT, ONE, quantise
 from blysk.golden.reference.geometry import Mesh
 from blysk.golden.reference.texture import Texture
 
-__all__ = ["BLOCK_BITS", "MeshMemory", "Part", "block_rams"]
+__all__ = ["BLOCK_BITS", "BLOCK_WORDS", "MeshMemory", "Part", "block_rams"]
 
 BLOCK_BITS = 36
 """Width in bits of an ECP5's block RAM with 512 words."""
 
-_BLOCK_WORDS = 512
+BLOCK_WORDS = 512
+"""Words of this block RAM."""
 
 
 def block_rams(words: int, width: int) -> int:
@@ -80,11 +81,14 @@ class MeshMemory:
         These attributes, first colours, then texture coordinates.
     placement : int64 array, shape (M, 3), optional
         Base of u, base of v and range of the texture coordinates of each material.
+    room : (int, int), optional
+        Vertices and triangles that the memories can hold. By default as many as there are.
 
     Raises
     ------
     ValueError
-        If there are too few or too many vertices or triangles, or a corner is no vertex.
+        If there are too few or too many vertices or triangles, or a corner is no vertex. If the memories are
+        too small or too large.
 
     Source: docs/theory/video.md#vertices; not in the documents.
     """
@@ -96,6 +100,7 @@ class MeshMemory:
     surface: AttributeSpans | None = None
     attributes: np.ndarray | None = None
     placement: np.ndarray | None = None
+    room: tuple[int, int] | None = None
 
     VERTEX_BITS = 6 * COMPONENT.width
     LARGEST = 4096
@@ -104,6 +109,12 @@ class MeshMemory:
         for name, count in (("vertices", len(self.position)), ("triangles", len(self.faces))):
             if not 1 <= count < self.LARGEST:
                 raise ValueError(f"a mesh memory holds 1 to {self.LARGEST - 1} {name}, not {count}")
+        for name, count, size in (
+            ("vertices", self.vertices, self.vertex_room),
+            ("triangles", self.triangles, self.triangle_room),
+        ):
+            if not count <= size < self.LARGEST:
+                raise ValueError(f"a memory for {count} to {self.LARGEST - 1} {name}, not {size}")
         for wrong in self.faces[(self.faces < 0) | (self.faces >= self.vertices)][:1]:
             raise ValueError(f"a corner must be a vertex, 0 to {self.vertices - 1}, not {wrong}")
 
@@ -183,9 +194,19 @@ class MeshMemory:
         return len(self.faces)
 
     @property
+    def vertex_room(self) -> int:
+        """Number of vertices that the memory can hold."""
+        return self.vertices if self.room is None else self.room[0]
+
+    @property
+    def triangle_room(self) -> int:
+        """Number of triangles that the memory can hold."""
+        return self.triangles if self.room is None else self.room[1]
+
+    @property
     def index_bits(self) -> int:
         """Bits of the index of a vertex."""
-        return max((self.vertices - 1).bit_length(), 1)
+        return max((self.vertex_room - 1).bit_length(), 1)
 
     @property
     def vertex_bits(self) -> int:
@@ -220,10 +241,34 @@ class MeshMemory:
     def blocks(self, screen_bits: int) -> int:
         """Number of block RAMs for vertices, triangles, and screen vertices of ``screen_bits`` bits."""
         return (
-            block_rams(self.vertices, self.vertex_bits)
-            + block_rams(self.triangles, 3 * self.index_bits)
-            + block_rams(self.vertices, screen_bits)
+            block_rams(self.vertex_room, self.vertex_bits)
+            + block_rams(self.triangle_room, 3 * self.index_bits)
+            + block_rams(self.vertex_room, screen_bits)
         )
+
+    def largest_room(self, screen_bits: int) -> tuple[int, int]:
+        """Most vertices and triangles in as many block RAMs as the memories take.
+
+        Parameters
+        ----------
+        screen_bits : int
+            As for `blocks`.
+        """
+        whole = range(BLOCK_WORDS, self.LARGEST + 1, BLOCK_WORDS)
+        limits = [min(words, self.LARGEST - 1) for words in whole]
+
+        def taken(vertices: int, triangles: int) -> list[int]:
+            index_bits = max((vertices - 1).bit_length(), 1)
+            words = (vertices, self.vertex_bits), (triangles, 3 * index_bits), (vertices, screen_bits)
+            return [block_rams(*memory) for memory in words]
+
+        def fits(vertices: int, triangles: int) -> bool:
+            own = taken(self.vertex_room, self.triangle_room)
+            return all(new <= old for new, old in zip(taken(vertices, triangles), own, strict=True))
+
+        vertices = max(self.vertex_room, *(words for words in limits if fits(words, self.triangle_room)))
+        triangles = max(self.triangle_room, *(words for words in limits if fits(vertices, words)))
+        return vertices, triangles
 
     @classmethod
     def triangles_that_fit(

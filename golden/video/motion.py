@@ -60,6 +60,11 @@ class Motion:
     cosine, sine : int64 arrays, shape (S, 21)
         c1 and c2 of each slot, codes of `ENTRY`.
 
+    Attributes
+    ----------
+    ROOM : int
+        Number of slots in the 512 words of a block RAM.
+
     Raises
     ------
     ValueError
@@ -72,7 +77,9 @@ class Motion:
     cosine: np.ndarray
     sine: np.ndarray
 
+    ROOM = 512 // ENTRIES
     TABLE_BITS = ANGLE_BITS - 2
+    WORD_BITS = OFFSET.width + 2 * ENTRY.width
     ENTRY_ERROR = 2 * 2 * 2.0**-17 + 2 * 2.0**-17 + 2.0**-21 + 2.0**-17
 
     @classmethod
@@ -135,10 +142,29 @@ class Motion:
         except ValueError as error:
             raise ValueError(f"the camera is too near to a mesh, or too far from it: {error}") from None
 
+    def padded(self, slots: int) -> "Motion":
+        """The motion with slots of zeros behind its own, up to a number of slots."""
+        rows = [np.pad(c, ((0, slots - len(c)), (0, 0))) for c in (self.constant, self.cosine, self.sine)]
+        return Motion(*rows)
+
     @property
     def slots(self) -> int:
         """Number of matrices."""
         return len(self.constant)
+
+    @property
+    def words(self) -> list[int]:
+        """Words of the memory, 21 for each slot. From the lowest bit up: c0, c1, c2."""
+        columns = zip(self.constant.ravel(), self.cosine.ravel(), self.sine.ravel(), strict=True)
+        widths = OFFSET.width, ENTRY.width, ENTRY.width
+        shifts = 0, widths[0], widths[0] + widths[1]
+        return [
+            sum(
+                (int(code) & (1 << width) - 1) << shift
+                for code, width, shift in zip(row, widths, shifts, strict=True)
+            )
+            for row in columns
+        ]
 
     @cached_property
     def table(self) -> Fixed:

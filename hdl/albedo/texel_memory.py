@@ -10,6 +10,7 @@ from blysk.golden.albedo.texel_memory import BANKS, TexelMemory
 from blysk.hdl.albedo.texture_address import texel_request_shape
 from blysk.hdl.core.memory import registered_read
 from blysk.hdl.core.pipelined_unit import PipelinedUnit
+from blysk.hdl.core.scene_memory import scene_memory
 
 __all__ = ["TexelMemoryUnit", "texel_write_shape", "texels_shape"]
 
@@ -71,8 +72,10 @@ class TexelMemoryUnit(PipelinedUnit):
             words = np.zeros((p.depth, BANKS), dtype=np.int64)
             words[: len(p.fixed.codes)] = p.fixed.words
             for number, found in enumerate(self._words):
-                init = words[:, number].tolist()
-                m.submodules[f"bank_{number}"] = memory = Memory(shape=p.WORD_BITS, depth=p.depth, init=init)
+                given = words[:, number].tolist()
+                m.submodules[f"bank_{number}"] = memory = scene_memory(
+                    f"texels_{number}", p.WORD_BITS, p.depth, given
+                )
                 word, _ = registered_read(m, memory, self.i.payload[number], self.advance)
                 m.d.comb += found.eq(word)
             return m

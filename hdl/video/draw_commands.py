@@ -2,10 +2,10 @@
 
 from amaranth.hdl import Module, Signal, unsigned
 from amaranth.lib import data, stream, wiring
-from amaranth.lib.memory import Memory
 from amaranth.lib.wiring import In, Out
 
 from blysk.golden.video.draw_commands import COMMAND_BITS, KINDS, DrawCommands
+from blysk.hdl.core.scene_memory import scene_memory
 from blysk.hdl.core.stream import skid_buffer
 
 __all__ = ["DrawCommandsUnit", "command_shape", "walk_request_shape"]
@@ -59,7 +59,7 @@ class DrawCommandsUnit(wiring.Component):
         """The address, and the word that the memory gives."""
         m = Module()
         words = self.model.codes
-        m.submodules.commands = memory = Memory(shape=COMMAND_BITS, depth=len(words), init=words)
+        m.submodules.commands = memory = scene_memory("commands", COMMAND_BITS, len(words), words)
         read = memory.read_port()
         address, first_band = Signal.like(self.i.payload.start, name="address"), Signal(name="first_band")
         walks, waits, valid = Signal(name="walks"), Signal(name="waits"), Signal(name="valid")

@@ -2,10 +2,10 @@
 
 from amaranth.hdl import Module, Signal, Value, unsigned
 from amaranth.lib import data, stream, wiring
-from amaranth.lib.memory import Memory
 from amaranth.lib.wiring import In, Out
 
 from blysk.golden.video.mesh_memory import MeshMemory
+from blysk.hdl.core.scene_memory import scene_memory
 from blysk.hdl.core.stream import skid_buffer
 from blysk.hdl.video.vertex_unit import mesh_vertex_shape
 
@@ -56,12 +56,12 @@ class MeshMemoryUnit(wiring.Component):
         """A counter, the memory, and the index beside its word."""
         m = Module()
         given = self.model
-        m.submodules.vertices = memory = Memory(
-            shape=given.vertex_bits, depth=given.vertices, init=given.vertex_words
+        m.submodules.vertices = memory = scene_memory(
+            "vertices", given.vertex_bits, given.vertex_room, given.vertex_words
         )
         read = memory.read_port()
         left, address = (
-            Signal(range(given.vertices + 1), name="left"),
+            Signal(range(given.vertex_room + 1), name="left"),
             Signal(given.index_bits, name="address"),
         )
         valid, index = Signal(name="valid"), Signal(given.index_bits, name="index")

@@ -10,6 +10,7 @@ from amaranth.lib.wiring import In, Out
 from blysk.golden.video.motion import ANGLE_BITS, ENTRIES, Motion
 from blysk.golden.video.vertex_unit import ENTRY, OFFSET
 from blysk.hdl.core.fixed import FixedShape, FixedValue
+from blysk.hdl.core.scene_memory import scene_memory
 
 __all__ = ["MotionUnit", "entry_shape", "turn_shape"]
 
@@ -75,18 +76,8 @@ class MotionUnit(wiring.Component):
         """Cosine and sine, then for each entry two products and their sum."""
         m = Module()
         model = self.model
-        mask = (1 << OFFSET.width) - 1, (1 << ENTRY.width) - 1
-        columns = (model.constant, model.cosine, model.sine)
-        rows = [
-            sum(
-                (value & mask[k > 0]) << shift
-                for k, (value, shift) in enumerate(zip(row, _SHIFTS, strict=True))
-            )
-            for row in zip(*(column.ravel().tolist() for column in columns), strict=True)
-        ]
-        m.submodules.coefficients = memory = Memory(
-            shape=OFFSET.width + 2 * ENTRY.width, depth=len(rows), init=rows
-        )
+        rows = model.words
+        m.submodules.coefficients = memory = scene_memory("coefficients", model.WORD_BITS, len(rows), rows)
         read = memory.read_port()
         sines = model.table.codes.tolist()
         m.submodules.sines = table = Memory(shape=ENTRY.width - 1, depth=len(sines), init=sines)

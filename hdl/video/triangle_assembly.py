@@ -8,6 +8,7 @@ from amaranth.lib.wiring import In, Out
 from blysk.golden.geometry.edge_setup import X_BITS
 from blysk.golden.geometry.triangles import MATERIAL_BITS
 from blysk.golden.video.triangle_assembly import COUNTERS, TriangleAssembly
+from blysk.hdl.core.scene_memory import scene_memory
 from blysk.hdl.core.views import copy
 from blysk.hdl.geometry.triangles import count_events, counters_shape, first_centre, triangle_shape
 from blysk.hdl.video.mesh_memory import range_shape
@@ -81,11 +82,11 @@ class TriangleAssemblyUnit(wiring.Component):
         """The walk through the triangles' words, the corners' words, and the test of the band."""
         m = Module()
         mesh = self.model.mesh
-        m.submodules.triangles = triangles = Memory(
-            shape=3 * mesh.index_bits, depth=mesh.triangles, init=mesh.triangle_words
+        m.submodules.triangles = triangles = scene_memory(
+            "triangles", 3 * mesh.index_bits, mesh.triangle_room, mesh.triangle_words
         )
         vertex = self.write.payload.vertex.shape()
-        m.submodules.vertices = vertices = Memory(shape=vertex.size, depth=mesh.vertices, init=[])
+        m.submodules.vertices = vertices = Memory(shape=vertex.size, depth=mesh.vertex_room, init=[])
         write, face, read = vertices.write_port(), triangles.read_port(), vertices.read_port()
         result, valid = Signal(self.o.payload.shape(), name="result"), Signal(name="valid")
         advance = Signal(name="advance")
@@ -104,7 +105,7 @@ class TriangleAssemblyUnit(wiring.Component):
         ]
 
         # A triangle's word is read a cycle before the address of its first corner, and kept for three cycles.
-        left, following = (Signal(range(mesh.triangles + 1), name=name) for name in ("left", "following"))
+        left, following = (Signal(range(mesh.triangle_room + 1), name=name) for name in ("left", "following"))
         material, corner = Signal(MATERIAL_BITS, name="material"), Signal(2, name="corner")
         walks = Signal(name="walks")
         last = corner == 2

@@ -170,6 +170,32 @@ def test_commands_of_a_scene():
     np.testing.assert_array_equal(writes[:, 2] | writes[:, 3] << 12, wanted["data"])
 
 
+def test_a_padded_drawing_sends_the_same_triangles():
+    """Lists of other lengths, a second material, and another mesh have the same memories but for words."""
+    first = Drawing.of([scene(64), replace(scene(64), lights=(Light((1, 0, 0)),))])
+    room = first.room
+    assert room == (512, 512, 768)
+    padded = first.padded(room)
+    assert padded.room == room
+    for preset_index in (0, 1):
+        kept, made = (each.triangles(700, preset_index, each.rows(3)) for each in (first, padded))
+        assert made[1] == kept[1]
+        for name in ("x", "y", "depth", "normal", "material"):
+            np.testing.assert_array_equal(getattr(made[0], name), getattr(kept[0], name))
+    other = Drawing.of([scene(200)] * 2).padded(room)
+    assert other.commands.starts == padded.commands.starts == (0, 768)
+    for sizes in (
+        lambda each: len(each.commands.words),
+        lambda each: each.motion.slots,
+        lambda each: each.room,
+    ):
+        assert sizes(other) == sizes(padded)
+    with pytest.raises(ValueError, match=r"a memory for [0-9]+ to 4095 triangles, not 9"):
+        first.padded(room._replace(triangles=9))
+    with pytest.raises(ValueError, match=r"a list of [0-9]+ commands does not fit a memory for 20"):
+        first.padded(room._replace(commands=20))
+
+
 def colored(shown, parts):
     """The scene with vertex colours and with an image of 16x8 texels, as far as ``parts`` name them."""
     rng, mesh = np.random.default_rng(4), shown.mesh

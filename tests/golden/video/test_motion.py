@@ -130,6 +130,19 @@ def test_block_rams_by_hand():
     assert 800 < few < more
 
 
+def test_room_in_the_same_block_rams():
+    """1,024 words of 18 bits or 512 words of 36 bits fit a block RAM. At most 4,095 words are counted."""
+    mesh = teapot(1000)
+    memory = MeshMemory.of([mesh])
+    assert (memory.vertices, memory.triangles) == (530, 992)
+    assert memory.largest_room(137) == (1024, 1024)
+    assert replace(memory, room=(1024, 1024)).largest_room(137) == (1024, 1024)
+    assert replace(memory, room=(1024, 1024)).blocks(137) == memory.blocks(137)
+    few = MeshMemory.of([teapot(64)])
+    assert few.largest_room(137) == (512, 512)
+    assert replace(few, room=(3600, 3600)).largest_room(137) == (4095, 4095)
+
+
 def test_too_many_triangles_are_refused():
     mesh = teapot(10_000)
     with pytest.raises(ValueError, match="holds 1 to 4095 vertices"):

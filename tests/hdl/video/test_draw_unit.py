@@ -41,7 +41,9 @@ def drawing_of(triangles, size, design, **options):
 
 @pytest.fixture(scope="module")
 def simulator():
-    return DrawingSimulator(drawing_of(120, (96, 64), board_design(materials=2)))
+    """Memories have room for more than this mesh, as on a board."""
+    drawing = drawing_of(120, (96, 64), board_design(materials=2))
+    return DrawingSimulator(drawing.padded(drawing.room))
 
 
 def expected(drawing, bands, buttons=None):
