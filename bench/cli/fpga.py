@@ -40,7 +40,9 @@ _DESIGN = DESIGN | {"transfer": DESIGN["transfer"]._replace(default="linear")}
     "devices",
     multiple=True,
     type=Choice("device", (*DEVICE_NAMES, "all")),
-    help="Print the parts of this kind of FPGA by Yosys alone, without placement. Repeat for more.",
+    help="Print the parts on FPGAs of this kind by Yosys alone, without placement. Repeat for more. "
+    + "; ".join(f"{name}: {device}" for name, device in DEVICE_NAMES.items())
+    + ".",
 )
 @click.option("--every-method", is_flag=True, help="Place the pipeline of every method.")
 @click.option(
@@ -111,6 +113,9 @@ def command(
     not time paths between registers on both sides of a multiplier. Lines below the table name the designs
     with these paths.
 
+    With --device the parts are cells of this FPGA, in the sizes of its family. Further columns have cells of
+    carries, and all other cells, such as wide multiplexers and inverters.
+
     \b
     Examples:
         blysk fpga --seeds 3 --json quotient.json
@@ -119,6 +124,8 @@ def command(
         blysk fpga --albedo colors --transfer srgb
         blysk fpga --top render --style compact --target 115 --seeds 1
         blysk fpga --top render --style compact --by-unit
+        blysk fpga --device xc7 --device gowin
+        blysk fpga --device ice40 --memories synchronous
     """
     chosen, build = given_options(context, [*_DESIGN, *_NEEDS]), given_options(context, _BUILD)
     given = [*chosen, *build, *given_options(context, ["every_method"])]

@@ -1,7 +1,8 @@
 """Committed results of place and route: parts and clock rates of pipelines, each with its date.
 
 A quick report reads these results, because placement takes minutes. ``blysk fpga --json FILE`` measures
-further designs. ``python -m blysk.bench.report.placed FILE [FILE ...]`` merges the files into the store.
+further designs. With ``--device`` there are parts, and no clock rates.
+``python -m blysk.bench.report.placed FILE [FILE ...]`` merges the files into the store.
 """
 
 import json
@@ -22,6 +23,8 @@ from blysk.sim.output import write_json
 __all__ = ["merged", "placed"]
 
 _PARTS = ("luts", "flip_flops", "multipliers", "block_rams", "distributed_rams")
+_MAPPED = ("carries", "others")
+"""Further parts of designs that are mapped to a device without placement."""
 
 
 def merged(
@@ -43,15 +46,17 @@ def merged(
     Returns
     -------
     list of dict
-        Entries in the order of device and name: ``design``, ``device``, the parts, ``fmax_mhz`` of each seed,
-        ``tools``, ``date`` and ``command``.
+        Entries in the order of device and name: ``design``, ``device``, the parts, ``fmax_mhz`` of each seed
+        (none without placement), ``tools``, ``date`` and ``command``.
     """
     found = {(entry["device"], entry["design"]): dict(entry) for entry in entries}
     for design in measured["designs"]:
-        found[measured["device"], design["design"]] = {
+        # Designs that are only mapped may have several devices.
+        device = design["device"] if "device" in design else measured["device"]
+        found[device, design["design"]] = {
             "design": design["design"],
-            "device": measured["device"],
-            **{part: design[part] for part in _PARTS},
+            "device": device,
+            **{part: design[part] for part in (*_PARTS, *(part for part in _MAPPED if part in design))},
             "fmax_mhz": [seed["fmax"] for seed in design["seeds"]],
             "tools": measured["tools"],
             "date": date,

@@ -45,6 +45,7 @@ from blysk.sim.output import write_json
 
 __all__ = [
     "about",
+    "aligned",
     "count_by_unit",
     "name_of",
     "pipelines_of",
@@ -76,17 +77,17 @@ def table(layouts: Sequence[Layout], family: Family = ECP5) -> str:
                 f"{slowest.logic:.1f}+{slowest.routing:.1f} {slowest.start} -> {slowest.end}",
             )
         )
-    return _aligned(lines, {0, len(_HEAD) - 1})
+    return aligned(lines, {0, len(_HEAD) - 1})
 
 
 def table_by_unit(name: str, units: Mapping[str, Parts], family: Family = ECP5) -> str:
     """Parts of each unit as aligned text. The first row has the device's parts, the last row the design's."""
     rows = {family.device: family.capacity, **units, name: sum_parts(units)}
     head = ("unit", *_HEAD[1:6])
-    return _aligned([head, *((unit, *map(str, asdict(parts).values())) for unit, parts in rows.items())], {0})
+    return aligned([head, *((unit, *map(str, asdict(parts).values())) for unit, parts in rows.items())], {0})
 
 
-def _aligned(lines: Sequence[Sequence[str]], left: Container[int]) -> str:
+def aligned(lines: Sequence[Sequence[str]], left: Container[int]) -> str:
     """Lines of words as columns. Columns in ``left`` are aligned left, and other columns right."""
     widths = [max(map(len, column)) for column in zip(*lines, strict=True)]
     return "\n".join(

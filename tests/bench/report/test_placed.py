@@ -8,6 +8,8 @@ from click.testing import CliRunner
 
 from blysk.bench.report import placed as module
 from blysk.bench.report.placed import merged, placed
+from blysk.bench.tools.device_names import DEVICE_NAMES
+from blysk.bench.tools.devices import PARTS
 from blysk.bench.tools.families import DEVICE
 from blysk.golden.presets import LOBES, METHODS, MODELS, PUBLISHED
 from blysk.sim.api.placed import STORE, design_of, read_store
@@ -49,6 +51,27 @@ def test_table_of_colours_is_the_store():
         assert shown == [entry[name] for name in ("luts", "flip_flops", "multipliers", "block_rams")], entry
         assert [int(rate) for rate in rates.split(", ")] == sorted(map(round, entry["fmax_mhz"])), entry
     assert len(rows) == len(store)
+
+
+def test_table_of_other_fpgas_is_the_store():
+    """Every row of a design without placement has the parts of the store, and every entry has a row."""
+    clocked = ", memories synchronous"
+    store = {
+        (entry["device"], entry["design"].endswith(clocked)): entry
+        for entry in read_store()
+        if not entry["fmax_mhz"]
+    }
+    rows = re.findall(
+        r"^\| ([\w ]+) \| (within a cycle|at a clock edge) \|((?: [\d,]+ \|){7})$",
+        GUIDE.read_text(encoding="utf-8"),
+        re.MULTILINE,
+    )
+    assert {entry["device"] for entry in store.values()} == set(DEVICE_NAMES.values())
+    assert {(device, memories == "at a clock edge") for device, memories, _ in rows} == set(store)
+    for device, memories, cells in rows:
+        shown = [int(cell.replace(",", "")) for cell in cells.split("|")[:-1]]
+        entry = store[device, memories == "at a clock edge"]
+        assert shown == [entry[part] for part in PARTS.values()], entry
 
 
 def measured(name, *rates):
