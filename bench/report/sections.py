@@ -10,6 +10,8 @@ SECTIONS: dict[str, str] = {
     "stability": "blysk.bench.report.stability",
     "needs": "blysk.bench.report.needs",
     "criteria": "blysk.bench.report.criteria",
+    "rivals": "blysk.bench.report.rivals",
+    "words": "blysk.bench.report.words",
     "world": "blysk.bench.report.world",
     "place-and-route": "blysk.bench.report.place_and_route",
     "geometry": "blysk.bench.report.geometry",

@@ -36,6 +36,7 @@ class Abbas(Rival):
 
     NAME: ClassVar = "abbas"
     TITLE: ClassVar = "Abbas and others 2001, quadratics of the colours"
+    SPAN_CYCLES: ClassVar = 1
     SURFACES: ClassVar[Surfaces] = Surfaces(SQ(13, 29))
 
     def host(self, scene: Scene, triangles: ScreenTriangles) -> Polynomial:

@@ -51,8 +51,6 @@ class TracedQuotient(Quotient):
             format = SQ(bits, 0) if signed else UQ(bits, 0)
             return Fixed(format, format.wrap(words[name]))
 
-        for name in ("m", "w"):
-            trace.added(word(name, 42, True))
         trace.added(word("q", 36))
         step = 21 - self.TABLE_BITS
         normal = words["q shifted"]
@@ -110,6 +108,7 @@ class Duff(Rival):
 
     NAME: ClassVar = "duff"
     TITLE: ClassVar = "Duff 1979, a root a pixel over a triangle"
+    SPAN_CYCLES: ClassVar = 1
     SETUP_CYCLES: ClassVar = 8
     SQUARES: ClassVar[Surfaces] = Surfaces(SQ(3, 47))
     LOWEST: ClassVar[int] = -2
@@ -192,7 +191,7 @@ class Duff(Rival):
         shifts = [np.zeros_like(words.columns), words.columns, words.rows]
         products = {}
         for first, second in _PAIRS:
-            exact = trace.product(vectors[first], vectors[second], "triangle").codes.sum(axis=1)
+            exact = trace.summed(trace.product(vectors[first], vectors[second], "triangle"), "triangle").codes
             # Exact: a sum of three products has 36 bits.
             places = self.SQUARES.format.fraction_bits - 34 - shifts[first] - shifts[second]
             products[first, second] = np.ldexp(exact.astype(np.float64), places)
@@ -215,11 +214,12 @@ class Duff(Rival):
         found = []
         for codes, shift in zip(words[:3], (None, words.columns, words.rows), strict=True):
             vector = Fixed(component, codes[:, np.newaxis, :3])
-            exact = trace.product(vector, other, "triangle").codes.sum(axis=2).astype(np.float64)
+            product = trace.summed(trace.product(vector, other, "triangle"), "triangle")
+            exact = product.codes.astype(np.float64)
             places = format.fraction_bits - 34 - (0 if shift is None else shift[:, np.newaxis])
             found.append(np.floor(np.ldexp(exact, places)).astype(np.int64))
         start, across, down = (of[triangles.triangle] for of in found)
         value = start + triangles.i[:, np.newaxis] * across + triangles.j[:, np.newaxis] * down
-        for _ in range(2):
-            trace.added(Fixed(format, format.wrap(found[0])), "span")
-        return trace.added(Fixed(format, format.wrap(value)))
+        values = Fixed(format, format.wrap(value))
+        trace.added(values[triangles.first], "span")
+        return trace.added(values)

@@ -64,13 +64,18 @@ def middles_of(corners: Sequence[np.ndarray]) -> list[np.ndarray]:
 class Rival(ABC):
     """A method of other people as a bit-accurate model.
 
-    It shades the fragments of `rasterise` without cutting a triangle or a span. A beat brings a triangle.
+    It shades the fragments of `rasterise`. No triangle or span is cut, and a beat brings a triangle. The
+    methods of this project are measured by the same base; see `SpanDesign`.
     """
 
     NAME: ClassVar[str]
     TITLE: ClassVar[str]
     REFLECTION: ClassVar[ReflectionModel] = BLINN
     """Model of the exact picture with which the rival is compared."""
+    HARDWARE: ClassVar[str] = ""
+    """Name of the method with hardware in this project; empty for a model alone."""
+    SPAN_CYCLES: ClassVar[int] = 3
+    """Cycles of a span among which its products share multipliers."""
     SETUP_CYCLES: ClassVar[int] = 1
     """Cycles of a triangle before its spans in hardware: 8 if it has products, which share multipliers."""
 
@@ -112,6 +117,7 @@ class SurfaceRival(Rival):
     Source: docs/theory/rivals.md.
     """
 
+    SPAN_CYCLES: ClassVar = 1
     SURFACES: ClassVar[Surfaces] = Surfaces()
 
     @abstractmethod

@@ -27,11 +27,9 @@ def ones(codes: np.ndarray, format: Format) -> np.ndarray:
     return found
 
 
-def _differs(codes: np.ndarray, format: Format) -> float:
-    """Mean number of bits of a row of codes that differ from the row before."""
-    if len(codes) < 2:
-        return 0.0
-    return float(ones(codes[1:] ^ codes[:-1], format).sum()) / (len(codes) - 1)
+def _differs(codes: np.ndarray, format: Format) -> int:
+    """Number of bits that differ from a row of codes to the next, over all rows."""
+    return int(ones(codes[1:] ^ codes[:-1], format).sum())
 
 
 class Trace:
@@ -44,10 +42,10 @@ class Trace:
     - A product takes `tiles` times `tiles` multipliers.
     - An addition takes as many adder bits as its result has.
     - A memory counts its bits. Tables that several words of a pixel read count for each.
-    - Every result of the rate ``pixel`` is kept in one register.
-    - *Switched bits* count at the rate ``pixel`` alone, from a pixel to the next. They are the changed bits
-      of every register, and the changed bits of the array ``a_i b_j`` of partial products of every
-      multiplier.
+    - Every result is kept in one register; ``register_bits`` counts those of the rate ``pixel``.
+    - *Switched bits* are the changed bits of every register, and the changed bits of the array ``a_i b_j`` of
+      partial products of every multiplier, from a pixel, span or triangle to the next. `switched_a_pixel` is
+      their number for a pixel.
 
     All models and designs are counted by these rules. They leave out control, flags and wires.
     """
@@ -57,12 +55,31 @@ class Trace:
         self.adder_bits: Counter[str] = Counter()
         self.memory_bits = 0
         self.register_bits = 0
-        self.switched = 0.0
+        self.switched = 0
+        self.pixels = 0
+
+    @property
+    def switched_a_pixel(self) -> float:
+        """Switched bits of all operations, divided by the number of pixels."""
+        return self.switched / max(self.pixels, 1)
+
+    def multipliers_at(self, span_cycles: int = 3, triangle_cycles: int = 8) -> int:
+        """Multipliers for a pixel a cycle, if products of a span and of a triangle share multipliers."""
+        return self._shared(self.multipliers, span_cycles, triangle_cycles)
+
+    def adder_bits_at(self, span_cycles: int = 3, triangle_cycles: int = 8) -> int:
+        """Bits of adders for a pixel a cycle, if additions of a span and of a triangle share adders."""
+        return self._shared(self.adder_bits, span_cycles, triangle_cycles)
+
+    @staticmethod
+    def _shared(parts: Counter[str], span_cycles: int, triangle_cycles: int) -> int:
+        return parts["pixel"] - (-parts["span"] // span_cycles) - (-parts["triangle"] // triangle_cycles)
 
     def _kept(self, word: Fixed, rate: str) -> None:
         if rate == "pixel":
             self.register_bits += word.format.width * int(np.prod(word.shape[1:]))
-            self.switched += _differs(word.codes, word.format)
+            self.pixels = max(self.pixels, len(word.codes))
+        self.switched += _differs(word.codes, word.format)
 
     def product(self, a: Fixed, b: Fixed, rate: str = "pixel") -> Fixed:
         """Exact product of two arrays of words, counted.
@@ -78,11 +95,11 @@ class Trace:
         words = int(np.prod(result.shape[1:]))
         self.multipliers[rate] += words * tiles(a.format) * tiles(b.format)
         self._kept(result, rate)
-        if rate == "pixel" and len(result.codes) > 1:
+        if len(result.codes) > 1:
             operands = [(np.broadcast_to(of.codes, result.shape), of.format) for of in (a, b)]
             each = np.multiply(*(ones(codes, format) for codes, format in operands))
             both = np.multiply(*(ones(codes[1:] & codes[:-1], format) for codes, format in operands))
-            self.switched += float((each[1:] + each[:-1] - 2 * both).sum()) / (len(each) - 1)
+            self.switched += int((each[1:] + each[:-1] - 2 * both).sum())
         return result
 
     def added(self, word: Fixed, rate: str = "pixel") -> Fixed:
@@ -90,6 +107,15 @@ class Trace:
         self.adder_bits[rate] += word.format.width * int(np.prod(word.shape[1:]))
         self._kept(word, rate)
         return word
+
+    def summed(self, product: Fixed, rate: str = "pixel") -> Fixed:
+        """Sum of products along the last axis, counted as a row of adders."""
+        total = product[..., 0]
+        for k in range(1, product.shape[-1]):
+            total = total + product[..., k]
+            word = Fixed(total.format, total.codes if total.codes.ndim > 1 else total.codes[:, np.newaxis])
+            self.added(word, rate)
+        return total
 
     def read(self, memory_bits: int, *columns: Fixed) -> None:
         """Columns of a word that a pixel reads from a memory of this number of bits, for each word."""

@@ -58,6 +58,12 @@ class ScreenTriangles(NamedTuple):
     i: np.ndarray
     j: np.ndarray
 
+    @property
+    def first(self) -> np.ndarray:
+        """Indices of the first fragments of spans."""
+        begins = (np.diff(self.triangle) != 0) | (np.diff(self.j) != 0)
+        return np.flatnonzero(np.r_[True, begins])
+
 
 def screen_triangles(scene: Scene, raster: Raster) -> ScreenTriangles:
     """Triangles of a raster, with corners that are rounded as `rasterise` rounds them.
@@ -223,7 +229,10 @@ class Surfaces:
         # An int64 wraps modulo 2^64. The low bits of the sum are those of the hardware.
         step = f_x + i * f_xx + j * f_xy
         value = f + i * f_x + j * f_y + i * (i - 1) // 2 * f_xx + i * j * f_xy + j * (j - 1) // 2 * f_yy
-        for _ in range(3):
-            trace.added(words[:, :, 0], "span")
-        trace.added(Fixed(self.format, self.format.wrap(step)))
-        return trace.added(Fixed(self.format, self.format.wrap(value)))
+        steps, values = (Fixed(self.format, self.format.wrap(of)) for of in (step, value))
+        first = triangles.first
+        # The difference along the edge has as many bits as f_x.
+        for of_span in (values, steps, steps):
+            trace.added(of_span[first], "span")
+        trace.added(steps)
+        return trace.added(values)

@@ -27,8 +27,8 @@ def test_parts_and_switched_bits_of_a_small_datapath():
         for row, y in zip(a.codes.tolist(), b.codes[:, 0].tolist(), strict=True)
     ]
     bits = [[[x >> i & 1 for i in range(38)] for x in row] for row in result.codes.tolist()]
-    switched = sum(int(np.abs(np.diff(np.array(of), axis=0)).sum()) for of in (partial, bits)) / 2
-    assert trace.switched == switched
+    switched = sum(int(np.abs(np.diff(np.array(of), axis=0)).sum()) for of in (partial, bits))
+    assert trace.switched_a_pixel == switched / 3
     trace.added(result, "span")
     trace.read(100, result)
     assert trace.adder_bits == {"span": 76}
@@ -37,3 +37,12 @@ def test_parts_and_switched_bits_of_a_small_datapath():
 
 def test_operands_over_18_bits_take_several_multipliers():
     assert [tiles(UQ(0, bits)) for bits in (1, 18, 19, 36, 37)] == [1, 1, 2, 2, 3]
+
+
+def test_products_of_spans_and_triangles_share_multipliers():
+    word = Fixed(UQ(0, 17), np.ones((2, 1), dtype=np.int64))
+    trace = Trace()
+    for rate, count in (("pixel", 11), ("span", 13), ("triangle", 9)):
+        for _ in range(count):
+            trace.product(word, word, rate)
+    assert (trace.multipliers_at(), trace.multipliers_at(1)) == (11 + 5 + 2, 11 + 13 + 2)
