@@ -90,7 +90,8 @@ class SpanDesign(Rival):
 
 def _along(planes: Sequence[np.ndarray], i: np.ndarray, j: np.ndarray) -> np.ndarray:
     start, across, down = planes
-    return start + across * i + down * j
+    found: np.ndarray = start + across * i + down * j
+    return found
 
 
 def _sums(

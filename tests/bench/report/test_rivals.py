@@ -68,7 +68,6 @@ def _fake(task):
 
 
 @pytest.mark.long
-@pytest.mark.ci
 def test_section_of_made_up_results():
     chosen = tasks(quick=True)
     found = section(chosen, [_fake(task) for task in chosen])
