@@ -26,6 +26,7 @@ APART = (
 )
 """Two small units, and parts with other structures than those of the cores."""
 
+WITH_LANES = "2 lanes"
 WITH_ALBEDO = "albedo, both, tints, chord-local, 2 lights, srgb"
 """A long variant of the pipeline, which has the units of an albedo."""
 
@@ -38,7 +39,7 @@ CORES = {
     re.sub(r"\W+", "_", f"{name} {variant}").strip("_"): given.unit
     for name, record in RECORDS.items()
     for variant, given in record.variants.items()
-    if (name == "pipeline" and (not given.long or variant == WITH_ALBEDO))
+    if (name == "pipeline" and (not given.long or variant in (WITH_ALBEDO, WITH_LANES)))
     or (variant == record.default and name in (*WHOLE, *APART))
 }
 """Names of modules by groups: some of their own, the pipelines, and modules of neither group."""

@@ -220,7 +220,7 @@ def test_several_pipelines_give_the_same_picture():
 @pytest.mark.long
 def test_two_lanes_give_the_same_picture():
     """Two lanes take fewer cycles, and the figures name their number."""
-    options = {"size": (64, 48), "triangles": 400}
+    options = {"size": (160, 120), "triangles": 400}
     one, two = (blysk.render("teapot", lanes=lanes, **options) for lanes in (1, 2))
     np.testing.assert_array_equal(two.image, one.image)
     assert one.pixels == two.pixels

