@@ -50,8 +50,8 @@ LIGHTS = (1, 2, 4, 8)
 
 EXPONENTS = (10, 100, 1000)
 
-_DRAWN = 100
-"""Exponent of the drawings."""
+DRAWN = 100
+"""Exponent of the drawings, and of switched bits."""
 
 QUICK, FULL = (
     ((160, 120), ("teapot-1000", "ring-36")),
@@ -107,14 +107,14 @@ def errors(name: str, mesh: str, size: Sequence[int], exponents: Sequence[int]) 
         - ``max_lsb``: largest error off the border of the light, before rounding to 8 bits;
         - ``pixel_lsb``: the same of the pixels;
         - ``share``: share of the shown triangles with an error over `SHARED_LSB` before rounding;
-        - ``cycles``: cycles a pixel, and ``switched``: switched bits a pixel.
+        - ``cycles``: cycles a pixel, and ``switched``: switched bits a pixel, at the exponent `DRAWN`.
     """
     rival = COMPARED[name]
     scene, raster = _rastered(mesh, tuple(size))
     found = []
     for exponent in exponents:
         scene = replace(scene, material=replace(scene.material, exponent=exponent))
-        trace = Trace()
+        trace = Trace(switches=exponent == DRAWN)
         shades = rival.shade(scene, raster, trace)
         exact = 255 * render(scene, "phong", rival.REFLECTION, raster).image.reshape(-1, 3)
         border = border_mask(scene, raster, rival.REFLECTION).reshape(-1)
@@ -133,7 +133,7 @@ def errors(name: str, mesh: str, size: Sequence[int], exponents: Sequence[int]) 
                 "pixel_lsb": float(np.abs(shades.color[which] - exact).max()),
                 "share": float((worst[np.unique(triangle)] > SHARED_LSB).mean()),
                 "cycles": _cycles(rival, scene, raster),
-                "switched": trace.switched_a_pixel,
+                "switched": trace.switched_a_pixel if trace.switches else None,
             }
         )
     return found
@@ -204,7 +204,7 @@ def parts(name: str, lights: int, mesh: str, size: Sequence[int], netlist: bool)
     rival = COMPARED[name]
     scene, raster = _rastered(mesh, tuple(size))
     scene = _lit(scene, lights)
-    trace = Trace()
+    trace = Trace(switches=False)
     rival.shade(scene, raster, trace)
     is_design = isinstance(rival, SpanDesign)
     counted = not is_design or rival.COUNTS_SETUP
@@ -228,7 +228,7 @@ def parts(name: str, lights: int, mesh: str, size: Sequence[int], netlist: bool)
 def tasks(quick: bool) -> list[Task]:
     """Errors of every method on every mesh, and its parts with each number of `LIGHTS`."""
     size, meshes = QUICK if quick else FULL
-    exponents = [_DRAWN] if quick else list(EXPONENTS)
+    exponents = [DRAWN] if quick else list(EXPONENTS)
     where = {"mesh": QUICK[1][0], "size": list(QUICK[0]), "netlist": not quick}
     found = [
         Task(errors, {"name": name, "mesh": mesh, "size": list(size), "exponents": exponents})
@@ -302,7 +302,7 @@ def _title(mesh: str, of: Mapping[str, Sequence[Mapping[str, Any]]]) -> str:
 
 def _drawn(found: Sequence[Mapping[str, Any]]) -> Mapping[str, Any]:
     """The frame of the drawn exponent."""
-    return next(of for of in found if of["exponent"] == _DRAWN)
+    return next(of for of in found if of["exponent"] == DRAWN)
 
 
 def _drawings(of_mesh: Mapping, of_lights: Mapping) -> list[tuple[Drawing, str]]:
@@ -332,7 +332,7 @@ def _drawings(of_mesh: Mapping, of_lights: Mapping) -> list[tuple[Drawing, str]]
         for lights, of in of_lights.items()
     }
     x = "area times time, bits of adders times cycles a pixel"
-    note = f"Exponent {_DRAWN}. The line is the front of the methods that draw Blinn's highlight. "
+    note = f"Exponent {DRAWN}. The line is the front of the methods that draw Blinn's highlight. "
     partly = "`kuijk-blake` counts only the multipliers of its setup, so its area is a lower bound. "
     return [
         _drawing("rivals-area", "Error against area times time, by mesh", x, by_area, note + partly),

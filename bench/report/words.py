@@ -18,7 +18,7 @@ from blysk.bench.store import Task
 from blysk.bench.svg import panels, svg
 from blysk.golden.cosines.chord_setup import ChordSetup, Differences, SpanValues
 from blysk.golden.cosines.quotient import Quotient
-from blysk.golden.cosines.quotient_spans import QuotientSpans, QuotientWords, SpanVectors
+from blysk.golden.cosines.quotient_spans import MARGIN, QuotientSpans, QuotientWords, SpanVectors
 from blysk.golden.frames.prepare import prepare
 from blysk.golden.lighting.diffuse import Diffuse
 from blysk.golden.lighting.lobe import Lobe, LobeTable
@@ -108,12 +108,20 @@ def _cut(codes: np.ndarray, dropped: int) -> np.ndarray:
     return codes >> dropped << dropped if dropped else codes
 
 
-def _nearest(codes: np.ndarray, dropped: int) -> np.ndarray:
-    """Nearest codes whose low bits are 0, for words that software rounds; towards 0 at the largest."""
-    if not dropped:
-        return codes
-    most = (1 << 17) - (1 << dropped)
-    return np.clip((codes + (1 << dropped - 1)) >> dropped << dropped, -most, most)
+def _shorter(vectors: SpanVectors, cut: Mapping[str, int]) -> SpanVectors:
+    """Nearest vectors whose words are shorter.
+
+    The margin of the largest component is `MARGIN` steps of the shorter word. So the scale is smaller.
+    """
+    dropped = [cut.get(name, 0) for name in ("v", "d")]
+    if not any(dropped):
+        return vectors
+    scale = (1 - (MARGIN << max(dropped)) * 2.0**-17) / (1 - MARGIN * 2.0**-17)
+    start, step = (
+        np.rint(codes * (scale * 0.5**bits)).astype(np.int64) << bits
+        for codes, bits in zip((vectors.start, vectors.step), dropped, strict=True)
+    )
+    return SpanVectors(start, step, vectors.exponent)
 
 
 def _of(name: str) -> property:
@@ -135,11 +143,7 @@ class _Spans(QuotientSpans):
     cut: Mapping[str, int] = field(default_factory=dict)
 
     def differences(self, vectors: SpanVectors, direction: np.ndarray | None = None) -> QuotientWords:
-        start, step = (
-            _nearest(codes, self.cut.get(name, 0))
-            for name, codes in (("v", vectors.start), ("d", vectors.step))
-        )
-        found = super().differences(SpanVectors(start, step, vectors.exponent), direction)
+        found = super().differences(_shorter(vectors, self.cut), direction)
         squares, line, height = (
             self.cut.get(name, 0) for name in ("differences of m, w", "difference of l", "difference of z")
         )
@@ -237,7 +241,7 @@ def _quotient_case(
     return _case(operands, unit[:, 0] * sine + unit[:, 2] * cosine, unit[:, 2])
 
 
-def _random_spans(count: int, longest: int) -> _Case:
+def _random_spans(count: int, longest: int, shortest: int = 1) -> _Case:
     """Spans as the cuts of ``quotient`` allow them: ends up to 90 degrees and a factor of 2 apart."""
     rng = np.random.default_rng(20)
     left, other = normalise(rng.normal(size=(2, count, 3)))
@@ -245,17 +249,20 @@ def _random_spans(count: int, longest: int) -> _Case:
     across = normalise(other - (other * left).sum(axis=1, keepdims=True) * left)
     angle = (np.pi / 2 * rng.random(count) ** 2)[:, np.newaxis]
     right = (np.cos(angle) * left + np.sin(angle) * across) * 2.0 ** rng.uniform(-1, 1, count)[:, np.newaxis]
-    length = np.rint(longest ** rng.random(count)).astype(np.int64)
+    length = np.rint(shortest * (longest / shortest) ** rng.random(count)).astype(np.int64)
     length[length == 2] = 3
     return _quotient_case(left, right, length, np.sin(0.5), np.cos(0.5))
 
 
-@lru_cache(maxsize=2)
-def _cases(method: str, size: tuple[int, int], random: int) -> list[_Case]:
-    """The fixed set: a coarse teapot and a coarse ring, and for ``quotient`` random spans."""
+@lru_cache(maxsize=8)
+def _cases(method: str, size: tuple[int, int], random: int, exponent: int) -> list[_Case]:
+    """The fixed set: a coarse teapot and a coarse ring, and for ``quotient`` random spans.
+
+    The exponent counts for ``chord-local``, which cuts spans by the error of the highlight.
+    """
     found = []
     for mesh in (teapot(1000), ring()):
-        scene = scene_for(mesh, 1, *size)
+        scene = scene_for(mesh, exponent, *size)
         design = preset(method)
         prepared = prepare(scene, design)
         spans, raster = prepared.spans, prepared.cut_raster
@@ -264,7 +271,9 @@ def _cases(method: str, size: tuple[int, int], random: int) -> list[_Case]:
         towards = scene.lights[0].towards()
         exact = normals @ towards, normals @ halfway_vector(towards, scene.camera.viewer)
         found.append(_case(_of_spans(method, spans, length, prepared.constants[0]), *exact))
-    return [*found, _random_spans(random, 257)] if method == "quotient" else found
+    if method == "quotient":
+        found += [_random_spans(random, 257), _random_spans(max(random // 50, 2), 4095, 2048)]
+    return found
 
 
 def _of_spans(
@@ -327,13 +336,13 @@ def error_of(
     """
     found = dict.fromkeys(["diffuse", *map(str, exponents)], 0.0)
     dropped = cut.get("terms", 0)
-    for case in _cases(method, tuple(size), random):
-        cosine, operand = (of[case.kept, 0] for of in case.operands(cut))
-        unit = Diffuse(cosine.format)
-        diffuse = _cut(unit.compute(cosine).codes, dropped) * 2.0**-17
-        exact = np.maximum(case.cosine, 0)
-        found["diffuse"] = max(found["diffuse"], 255 * float(np.abs(diffuse - exact).max()))
-        for exponent in exponents:
+    for exponent in exponents:
+        for case in _cases(method, tuple(size), random, exponent if method == "chord-local" else 1):
+            cosine, operand = (of[case.kept, 0] for of in case.operands(cut))
+            unit = Diffuse(cosine.format)
+            diffuse = _cut(unit.compute(cosine).codes, dropped) * 2.0**-17
+            exact = np.maximum(case.cosine, 0)
+            found["diffuse"] = max(found["diffuse"], 255 * float(np.abs(diffuse - exact).max()))
             lobe, table = _table(method, exponent, cut.get("entries", 0))
             term = _cut(lobe.compute(operand, unit.dark(cosine), table).codes, dropped) * 2.0**-17
             exact = np.where(case.cosine > 0, BLINN.reflect(case.highlight, exponent), 0)
@@ -377,7 +386,8 @@ def section(tasks: Sequence[Task], results: Sequence[Any]) -> Section:
         "Each word of a method is cut bit by bit, while all others keep their lengths. The figures are the "
         "largest errors of the diffuse term and of the highlight at full intensity, before a pixel is "
         "rounded. They are measured on a coarse teapot and a coarse ring. For `quotient` there are also "
-        "random spans up to 257 pixels, whose ends are up to 90 degrees and a factor of 2 apart.",
+        "random spans up to 257 pixels, and of 2048 to 4095 pixels. Their ends are up to 90 degrees and a "
+        "factor of 2 apart.",
     ]
     for method, words in METHODS.items():
         found = {

@@ -48,9 +48,15 @@ class Trace:
       their number for a pixel.
 
     All models and designs are counted by these rules. They leave out control, flags and wires.
+
+    Parameters
+    ----------
+    switches : bool
+        Whether switched bits are counted, too. This takes most of the time.
     """
 
-    def __init__(self) -> None:
+    def __init__(self, switches: bool = True) -> None:
+        self.switches = switches
         self.multipliers: Counter[str] = Counter()
         self.adder_bits: Counter[str] = Counter()
         self.memory_bits = 0
@@ -79,7 +85,8 @@ class Trace:
         if rate == "pixel":
             self.register_bits += word.format.width * int(np.prod(word.shape[1:]))
             self.pixels = max(self.pixels, len(word.codes))
-        self.switched += _differs(word.codes, word.format)
+        if self.switches:
+            self.switched += _differs(word.codes, word.format)
 
     def product(self, a: Fixed, b: Fixed, rate: str = "pixel") -> Fixed:
         """Exact product of two arrays of words, counted.
@@ -95,7 +102,7 @@ class Trace:
         words = int(np.prod(result.shape[1:]))
         self.multipliers[rate] += words * tiles(a.format) * tiles(b.format)
         self._kept(result, rate)
-        if len(result.codes) > 1:
+        if self.switches and len(result.codes) > 1:
             operands = [(np.broadcast_to(of.codes, result.shape), of.format) for of in (a, b)]
             each = np.multiply(*(ones(codes, format) for codes, format in operands))
             both = np.multiply(*(ones(codes[1:] & codes[:-1], format) for codes, format in operands))
