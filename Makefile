@@ -1,11 +1,16 @@
 # blysk: `make demo` renders the Utah teapot through simulated RTL, `make test` is run before a commit,
-# `make test-all` checks everything, `make site` builds report, live page, units, theory and guide.
+# `make test-all` checks everything, `make site` builds report, live page, units and documents, `make release` all that
+# is published.
 PYTHON ?= python3
 VENV := .venv
 BIN := $(VENV)/bin
 TEST_WORKERS ?= auto
 
 COMMA := ,
+
+VERSION := $(shell sed -n 's/^version = "\(.*\)"/\1/p' pyproject.toml)
+BOARDS ?= ulx3s-25f ulx3s-85f icepi-zero
+SHA256 := $(if $(shell command -v sha256sum),sha256sum,shasum -a 256)
 
 # Workers, and the commands that tests start, share their bytecode.
 unexport PYTHONDONTWRITEBYTECODE
@@ -17,7 +22,7 @@ LINT := import tomllib; of = tomllib.load(open("pyproject.toml", "rb"))["project
 	print(*of["optional-dependencies"]["lint"], *(one for one in of["dependencies"] if one.startswith(("click", "numpy"))), sep="\n")
 
 .PHONY: demo test test-quick test-all test-long test-ci prove prove-ci decided adversary mutants soak coverage bench \
-	pages site lint style types clean
+	pages docs site boards release lint style types clean
 
 demo: $(VENV)/.installed
 	$(BIN)/blysk render teapot --size 640x480 --compare teapot.png
@@ -84,8 +89,35 @@ pages: $(VENV)/.installed
 	mkdir -p build/pages
 	$(BIN)/blysk pages build/pages
 
+# Guide, theory and Python interface, in build/docs.
+docs: $(VENV)/.installed-docs
+	$(BIN)/python docs/site/make.py build/docs $(DOCS_OPTIONS)
+
 site: pages $(VENV)/.installed-web
-	$(BIN)/blysk web -o site --pages build/pages
+	$(MAKE) docs DOCS_OPTIONS="--pages build/pages $(DOCS_OPTIONS)"
+	$(BIN)/blysk web -o site --docs build/docs
+
+# Bitstreams, first frames and their page. A design that was mapped or routed before is taken from the cache.
+# BOARDS="ulx3s-25f icepi-zero" chooses boards.
+boards: $(VENV)/.installed-release
+	for board in $(BOARDS); do \
+		rm -rf build/boards/$$board && mkdir -p build/boards/$$board && \
+		$(BIN)/blysk board $$board --simulate 1 -o build/boards/$$board \
+			--record build/boards/$$board/figures.json && \
+		$(BIN)/blysk board $$board -o build/boards/$$board/blysk-$(VERSION)-$$board.bit \
+			--record build/boards/$$board/figures.json || exit 1; \
+	done
+	$(BIN)/python docs/site/boards.py build/boards $(BOARDS)
+
+# The wheel is built from the source archive.
+release: boards
+	$(MAKE) site DOCS_OPTIONS="--boards build/boards"
+	rm -rf dist
+	$(BIN)/python -m build $(BUILD_OPTIONS)
+	cp $(foreach board,$(BOARDS),build/boards/$(board)/*.bit) dist
+	tar -czf dist/blysk-$(VERSION)-site.tar.gz site
+	cd dist && $(SHA256) * > ../build/SHA256SUMS
+	mv build/SHA256SUMS dist
 
 lint: style types
 
@@ -119,9 +151,17 @@ $(VENV)/.installed-web: $(VENV)/.installed
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check -e '.[web]'
 	touch $@
 
+$(VENV)/.installed-docs: $(VENV)/.installed
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check -e '.[docs]'
+	touch $@
+
+$(VENV)/.installed-release: $(VENV)/.installed
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check -e '.[release]'
+	touch $@
+
 $(VENV)/.installed-bench: $(VENV)/.installed
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check -e '.[bench,fpga,report]'
 	touch $@
 
 clean:
-	rm -rf $(VENV) build site report *.egg-info teapot.png
+	rm -rf $(VENV) build dist site report *.egg-info teapot.png

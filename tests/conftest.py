@@ -26,6 +26,7 @@ BY_UNIT = ("tests/test_units.py", "tests/formal/test_units.py", "tests/bench/too
 
 BESIDE = {
     "tests/bench/report/test_report_browser.py": "tests/bench/report/test_report.py",
+    "tests/bench/web/test_documents_browser.py": "tests/bench/web/test_documents.py",
     "tests/bench/web/test_web_inside.py": "tests/bench/web/test_web_browser.py",
     "tests/test_citations.py": "tests/test_house.py",
 }

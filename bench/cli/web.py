@@ -5,7 +5,7 @@ from pathlib import Path
 import click
 
 from blysk.bench.web.web_designs import DESIGNS, SERVED, TABLES
-from blysk.bench.web.web_folder import PAGE, check_extras, check_folder, folders_of, report_files
+from blysk.bench.web.web_folder import PAGE, check_extras, check_folder, docs_files, report_files
 from blysk.golden.presets import METHODS, MIRROR_LOBES, MODELS
 from blysk.sim.errors import InputError
 from blysk.sim.frames.workers import processors
@@ -49,10 +49,10 @@ class _Design(click.ParamType):
     help="Report of `blysk bench`. Without this option the command measures a quick report.",
 )
 @click.option(
-    "--pages",
+    "--docs",
     type=click.Path(path_type=Path),
     metavar="FOLDER",
-    help="Pages of the units, from `blysk pages`.  [default: docs/blocks of the project, if it exists]",
+    help="Documents, from `make docs`. Without this option the site has none.",
 )
 @click.option(
     "--design",
@@ -69,12 +69,13 @@ class _Design(click.ParamType):
     show_default="number of cores",
     help="Processes that compile.",
 )
-def command(folder, report, pages, designs, jobs):
+def command(folder, report, docs, designs, jobs):
     """Write a static site: the pipeline as WebAssembly, simulated live while the light is moved.
 
     The page index.html opens from disk and from any web server, and loads only files of the site. The site
-    also has the report of error against run time, guide, theory, and the pages of the units. The first run
-    takes some minutes. The cache keeps modules, spans and measurements until the code changes.
+    also has the report of error against run time. `make site` adds guide, Python interface, theory and the
+    pages of the units. The first run takes some minutes. The cache keeps modules, spans and measurements
+    until the code changes.
 
     \b
     Example:
@@ -82,11 +83,12 @@ def command(folder, report, pages, designs, jobs):
         blysk web -o site --report report
     """
     check_folder(folder)
-    folders = folders_of(pages)
+    if docs is not None:
+        docs_files(docs)
     if report is not None:
         report_files(report)
     check_extras()
     from blysk.bench.web.web import make_site
 
-    make_site(folder, report, folders, designs, jobs)
+    make_site(folder, report, docs, designs, jobs)
     click.echo(f"{'site':<12}{folder / PAGE}")

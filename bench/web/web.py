@@ -19,7 +19,6 @@ from blysk.bench.report.page import embedded, environment
 from blysk.bench.report.report import about, chosen_tasks, measure_all, measured, write_report
 from blysk.bench.report.sections import SECTIONS
 from blysk.bench.store import Task
-from blysk.bench.web.documents import DOCUMENTS, documents
 from blysk.bench.web.web_data import (
     BACKGROUND,
     BANDS,
@@ -36,7 +35,7 @@ from blysk.bench.web.web_data import (
     texture_of,
 )
 from blysk.bench.web.web_designs import COLORED, DESIGNS
-from blysk.bench.web.web_folder import MARK, PAGE, check_folder, earlier, report_files
+from blysk.bench.web.web_folder import MARK, PAGE, check_folder, docs_files, earlier, report_files
 from blysk.bench.web.web_meshes import MESHES
 from blysk.bench.web.web_spans import COLUMNS
 from blysk.golden.lighting.specular import MAX_EXPONENT
@@ -44,8 +43,28 @@ from blysk.golden.presets import LOBES, MIRROR_LOBES, MODELS
 from blysk.sim.engines.cache import version_of
 from blysk.sim.output import atomic_writer, write_json, write_text
 
-__all__ = ["make_site", "tasks", "write_site"]
+__all__ = ["DOCUMENTS", "LIVE", "make_site", "tasks", "write_site"]
 
+DOCUMENTS = {
+    "docs/latest/guide/index.html": ("Guide", "how to use and to embed it, and its words"),
+    "docs/latest/api/index.html": ("Python", "functions and classes, with their options"),
+    "docs/latest/theory/index.html": ("Theory", "models, methods, error bounds, sources"),
+    "docs/latest/blocks/index.html": ("Units", "equations, formats, structure, timing and errors of each"),
+    "docs/latest/boards/index.html": ("Boards", "bitstreams, and what you should see"),
+}
+"""First pages of documents that a site may have: title, and contents."""
+
+LIVE = """\
+// Adds the live page of this site to the list of a page.
+{
+  const link = document.createElement("a");
+  link.className = "reference";
+  link.href = new URL("../index.html", document.currentScript.src);
+  link.textContent = "Live page";
+  document.getElementById("live").appendChild(document.createElement("li")).appendChild(link);
+}
+"""
+"""A script that every page of the documents loads."""
 
 # The site.
 
@@ -98,7 +117,7 @@ def write_site(
     tasks: Sequence[Task],
     results: Sequence[Any],
     report: Path | None = None,
-    folders: Mapping[str, Path] | None = None,
+    docs: Path | None = None,
 ) -> None:
     """Write the site. Each file is whole or not there. Files that only an earlier site has are removed.
 
@@ -110,13 +129,13 @@ def write_site(
         Tasks of `tasks`, and their results.
     report : Path, optional
         Folder of a report, which becomes part of the site.
-    folders : mapping of str to Path, optional
-        Folders of Markdown that become part of the site: see `documents`.
+    docs : Path, optional
+        Folder of ``make docs``, which becomes part of the site.
 
     Raises
     ------
     InputError
-        If a file cannot be written, or ``report`` holds no report.
+        If a file cannot be written, ``report`` holds no report, or ``docs`` no documents.
     """
     check_folder(folder)
     files = {
@@ -124,10 +143,13 @@ def write_site(
         "blysk.js": _read("web/core.js") + _read("web/worker.js") + _read("web/app.js"),
     }
     scripts, designs, meshes = _scripts(tasks, results)
-    pages, pictures = documents(folders or {})
-    files |= scripts | pages
-    if report is not None:
-        pictures |= {f"report/{path.name}": path for path in report_files(report)}
+    files |= scripts
+    copies = {} if report is None else {f"report/{path.name}": path for path in report_files(report)}
+    if docs is not None:
+        copies |= {f"docs/{name}": path for name, path in docs_files(docs).items()}
+        # In the documents alone this script does nothing.
+        del copies["docs/live.js"]
+        files["docs/live.js"] = LIVE
     files[PAGE] = (
         environment(__package__)
         .get_template("web/index.html")
@@ -139,14 +161,14 @@ def write_site(
                 if any(d["model"] == model for d in designs.values())
             ],
             version=version_of("blysk"),
-            documents={name: DOCUMENTS[name] for name in folders or {}},
+            documents={place: of for place, of in DOCUMENTS.items() if place in copies},
             has_report=report is not None,
             answers=_answers(report) if report else [],
             modules=len(designs),
             colored=any(mesh["albedo"] for mesh in meshes.values()),
         )
     )
-    _write(folder, files, pictures)
+    _write(folder, files, copies)
 
 
 def _scripts(tasks: Sequence[Task], results: Sequence[Any]) -> tuple[dict[str, str], dict, dict]:
@@ -234,7 +256,7 @@ def _write(folder: Path, files: Mapping[str, str], copies: Mapping[str, Path]) -
 def make_site(
     folder: Path,
     report: Path | None,
-    folders: Mapping[str, Path],
+    docs: Path | None,
     designs: Sequence[tuple[str, str]],
     jobs: int,
 ) -> None:
@@ -242,7 +264,7 @@ def make_site(
 
     Parameters
     ----------
-    folder, report, folders
+    folder, report, docs
         As in `write_site`. Without a report a quick report is measured.
     designs : sequence of (method, model)
         Designs of the modules. `DESIGNS` if empty.
@@ -262,4 +284,4 @@ def make_site(
         if report is None:
             report = Path(temporary, "report")
             write_report(report, measured(chosen, jobs, count), about(True, (), list(SECTIONS)))
-        write_site(folder, work, results, report, folders)
+        write_site(folder, work, results, report, docs)

@@ -5,13 +5,12 @@ import json
 from pathlib import Path
 from typing import Any
 
-from blysk.bench.tools.pages_folder import PROJECT
 from blysk.sim.errors import InputError
 from blysk.sim.installation import install_extra
 from blysk.sim.output import files_within
 from blysk.sim.run_files import reads
 
-__all__ = ["MARK", "PAGE", "check_extras", "check_folder", "earlier", "folders_of", "report_files"]
+__all__ = ["MARK", "PAGE", "check_extras", "check_folder", "docs_files", "earlier", "report_files"]
 
 MARK, PAGE = "site.json", "index.html"
 """Two files of a site: the mark and the first page. The mark tells that this program wrote the site."""
@@ -19,24 +18,13 @@ MARK, PAGE = "site.json", "index.html"
 _EXTRAS = ("ziglang", "jinja2", "markdown_it", "flip_evaluator", "skimage")
 
 
-def folders_of(pages: Path | None) -> dict[str, Path]:
-    """Existing folders of Markdown: documents of the project, and pages of the units.
-
-    Parameters
-    ----------
-    pages : Path, optional
-        Folder that ``blysk pages`` wrote. ``None``: the project's folder, if there is one.
-
-    Raises
-    ------
-    InputError
-        If the folder has no pages.
-    """
-    if pages is not None and not (pages / "README.md").is_file():
-        raise InputError(f"--pages {pages}", "holds no pages of units", "make them with `blysk pages FOLDER`")
-    docs = PROJECT / "docs"
-    folders = {"guide": docs / "guide", "theory": docs / "theory", "blocks": pages or docs / "blocks"}
-    return {name: path for name, path in folders.items() if any(path.glob("*.md"))}
+def docs_files(folder: Path) -> dict[str, Path]:
+    """Files of documents, by their places. `InputError` if the folder has no documents."""
+    if not (folder / "live.js").is_file() or not (folder / "latest" / PAGE).is_file():
+        raise InputError(
+            f"--docs {folder}", "holds no documents", "make them with `make docs`, in build/docs"
+        )
+    return {path.relative_to(folder).as_posix(): path for path in sorted(folder.rglob("*")) if path.is_file()}
 
 
 def check_extras() -> None:

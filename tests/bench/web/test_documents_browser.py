@@ -1,13 +1,10 @@
-"""Guide, theory and pages of units on a phone: no line is wider than the window, except inside its own
-box."""
+"""The documents in a browser, from disk: every page fits a phone, search and links work."""
 
-from pathlib import Path
+import shutil
 
 import pytest
 
-from blysk.bench.tools.pages import write_pages
-from blysk.bench.web import web, web_folder
-from blysk.bench.web.documents import documents
+from blysk.bench.web import web
 
 playwright = pytest.importorskip("playwright.sync_api", reason="playwright is not installed")
 
@@ -16,25 +13,32 @@ pytestmark = pytest.mark.long
 TOO_WIDE = "() => document.documentElement.scrollWidth - document.documentElement.clientWidth"
 
 
-def test_every_page_fits_a_phone(watching, tmp_path):
-    """A page of a unit and a page of a source, too."""
-    write_pages(tmp_path / "pages", ["dot_product"], samples=500)
-    texts, pictures = documents(web_folder.folders_of(tmp_path / "pages"))
-    texts["style.css"] = web._read("report.css") + web._read("web/site.css")
-    for name in dict.fromkeys(Path(name).parent for name in [*texts, *pictures]):
-        (tmp_path / "site" / name).mkdir(parents=True, exist_ok=True)
-    for name, text in texts.items():
-        (tmp_path / "site" / name).write_text(text, encoding="utf-8")
-    for name, path in pictures.items():
-        (tmp_path / "site" / name).write_bytes(path.read_bytes())
-    with watching() as (new_page, errors, _):
+def test_every_page_fits_a_phone(watching, documents):
+    """No line is wider than the window, except inside its own box. Nothing is loaded from elsewhere."""
+    with watching() as (new_page, errors, requests):
         page, wide = new_page((390, 844), 30), {}
-        for name in texts:
-            if name.endswith(".html"):
-                page.goto((tmp_path / "site" / name).as_uri())
-                wide[name] = page.evaluate(TOO_WIDE)
-    assert len(wide) > 25
-    assert any(name.startswith("source/") for name in wide)
-    assert not {name: by for name, by in wide.items() if by > 0}
-    # The index shows a picture of every unit, and here there is one unit.
-    assert all("ERR_FILE_NOT_FOUND" in error for error in errors)
+        for path in sorted((documents / "latest").rglob("*.html")):
+            page.goto(path.as_uri())
+            wide[path.relative_to(documents).as_posix()] = page.evaluate(TOO_WIDE)
+    assert len(wide) > 50
+    assert {name: by for name, by in wide.items() if by > 0} == {}
+    assert errors == []
+    assert all(url.startswith((documents.as_uri(), "data:")) for url in requests)
+
+
+def test_search_versions_and_the_live_page(watching, documents, tmp_path):
+    site = tmp_path / "site"
+    shutil.copytree(documents, site / "docs")
+    (site / "docs" / "live.js").write_text(web.LIVE)
+    (site / "index.html").write_text("<title>live</title>")
+    with watching() as (new_page, errors, _):
+        page = new_page((1280, 800), 30)
+        page.goto((site / "docs" / "latest" / "search.html?q=turntable").as_uri())
+        page.wait_for_selector("ul.search li a[href*='function-turntable']")
+        names = page.locator("#versions a").all_text_contents()
+        assert names[0] == "latest"
+        page.locator("#versions a").nth(1).click()
+        assert page.url == (site / "docs" / names[1] / "index.html").as_uri()
+        page.locator("#live a").click()
+        assert page.title() == "live"
+    assert errors == []

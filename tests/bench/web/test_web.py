@@ -2,11 +2,9 @@
 
 import base64
 import json
-import os
 import re
 import zlib
 from importlib import resources
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -325,38 +323,36 @@ def test_report_in_the_site(tmp_path, work, results):
     assert "report/index.html" not in (tmp_path / "site" / "index.html").read_text()
 
 
-def test_documents_in_the_site(tmp_path, work, results):
-    """Pages link each other. A link that leads out of them becomes text."""
-    guide, pages = tmp_path / "guide", tmp_path / "pages"
-    for folder in (guide, pages):
-        folder.mkdir()
-    (guide / "use.md").write_text(
-        "# To use it\n\n[a](../blocks/unit.md#a-b-c) [b](../../hdl/x.py) [c](#to-use-it)\n"
-        f"[d]({Path(os.path.relpath(web.__file__, guide)).as_posix()}) [e](../pages/unit.md)\n"
-    )
-    (pages / "README.md").write_text("# Units\n\n![p](p.svg) [u](unit.md)\n\n| a |\n|---|\n| 1 |\n")
-    (pages / "unit.md").write_text("## A `b`, c\n\n[up](README.md) [web](https://a.example)\n")
-    (pages / "p.svg").write_text("<svg/>")
+@pytest.fixture
+def docs(tmp_path):
+    """Documents as `make docs` lays them out, without units and boards."""
+    for place in ("index.html", "live.js", "latest/index.html", "0.2.0/index.html", "0.2.0/_static/a.css"):
+        (tmp_path / "docs" / place).parent.mkdir(parents=True, exist_ok=True)
+        (tmp_path / "docs" / place).write_text(place)
+    for place in web.DOCUMENTS:
+        if "/blocks/" not in place and "/boards/" not in place:
+            (tmp_path / place).parent.mkdir(exist_ok=True)
+            (tmp_path / place).write_text(place)
+    return tmp_path / "docs"
+
+
+def test_documents_in_the_site(tmp_path, work, results, docs):
+    """The live page links the first pages of the documents that are there, and they link the live page."""
     site = tmp_path / "site"
-    web.write_site(site, work, results, None, {"guide": guide, "blocks": pages})
-    use = (site / "guide" / "use.html").read_text()
-    assert '<h1 id="to-use-it">To use it</h1>' in use
-    assert '<a href="../blocks/unit.html#a-b-c">a</a> b <a href="#to-use-it">c</a>' in use
-    # By the places of the files. A source has a page of its own.
-    assert '<a href="../source/bench.web.web.py.html">d</a> <a href="../blocks/unit.html">e</a>' in use
-    assert "&quot;&quot;&quot;" in (site / "source" / "bench.web.web.py.html").read_text()
-    assert (site / "guide" / "index.html").read_text() == use
-    unit = (site / "blocks" / "unit.html").read_text()
-    assert '<h2 id="a-b-c">' in unit
-    assert '<a href="index.html">up</a> <a href="https://a.example">web</a>' in unit
-    assert '<div class="scroll"><table>' in (site / "blocks" / "index.html").read_text()
-    assert (site / "blocks" / "p.svg").read_text() == "<svg/>"
-    links = Reader((site / "index.html").read_text()).addresses
-    assert {"guide/index.html", "blocks/index.html"} <= set(links)
+    web.write_site(site, work, results, None, docs)
+    links = set(Reader((site / "index.html").read_text()).addresses)
+    assert {place for place in web.DOCUMENTS if (tmp_path / place).is_file()} == links & set(web.DOCUMENTS)
+    assert len(links & set(web.DOCUMENTS)) == 3
+    assert (site / "docs" / "0.2.0" / "_static" / "a.css").read_text() == "0.2.0/_static/a.css"
+    assert 'new URL("../index.html", document.currentScript.src)' in (site / "docs" / "live.js").read_text()
+    # Without them the links and the files disappear.
+    web.write_site(site, work, results)
+    assert not [path for path in (site / "docs").rglob("*") if path.is_file()]
+    assert "docs/latest" not in (site / "index.html").read_text()
 
 
-def test_every_link_of_the_site_leads_somewhere(tmp_path, work, results):
-    """Files, and anchors in them. The front page has the answers of a report."""
+def test_every_link_of_the_live_page_leads_somewhere(tmp_path, work, results, docs):
+    """Files and anchors. The page has the answers of a report."""
     report = tmp_path / "report"
     report.mkdir()
     conclusion = {"title": "What?", "sentence": "**This** much."}
@@ -364,32 +360,22 @@ def test_every_link_of_the_site_leads_somewhere(tmp_path, work, results):
     figures = {"program": "blysk", "files": ["index.html", "report.json"], "sections": sections}
     (report / "report.json").write_text(json.dumps(figures))
     (report / "index.html").write_text("<p>report</p>")
-    folders = {name: path for name, path in web_folder.folders_of(None).items() if name != "blocks"}
     site = tmp_path / "site"
-    web.write_site(site, work, results, report, folders)
-    assert "<strong>This</strong> much." in (site / "index.html").read_text()
-    pages = {path: path.read_text(encoding="utf-8") for path in site.rglob("*.html")}
-    assert len(pages) > 15
-    assert not any(' style="' in text for text in pages.values())
-    assert '<td class="right">' in pages[site / "theory" / "units.html"]
-    for path, text in pages.items():
-        for address in Reader(text).addresses:
-            if re.match(r"[a-z]+:", address):
-                continue
-            file, _, anchor = address.partition("#")
-            target = (path.parent / file).resolve() if file else path
-            assert target.is_file(), (path, address)
-            if anchor and target.suffix == ".html":
-                assert f'id="{anchor}"' in pages.get(target, target.read_text()), (path, address)
+    web.write_site(site, work, results, report, docs)
+    text = (site / "index.html").read_text()
+    assert "<strong>This</strong> much." in text
+    assert ' style="' not in text
+    page = Reader(text)
+    for address in page.addresses:
+        file, _, anchor = address.partition("#")
+        assert (site / file).is_file() if file else anchor in page.ids, address
 
 
-def test_folders_of_documents(tmp_path):
-    with pytest.raises(InputError, match="holds no pages of units; make them with `blysk pages FOLDER`"):
-        web_folder.folders_of(tmp_path)
-    (tmp_path / "README.md").write_text("# Units\n")
-    found = web_folder.folders_of(tmp_path)
-    assert found["blocks"] == tmp_path
-    assert {"guide", "theory"} <= set(found)
+def test_folder_of_documents(docs):
+    assert web_folder.docs_files(docs)["0.2.0/_static/a.css"] == docs / "0.2.0" / "_static" / "a.css"
+    (docs / "live.js").unlink()
+    with pytest.raises(InputError, match="holds no documents; make them with `make docs`"):
+        web_folder.docs_files(docs)
 
 
 # The command.
@@ -442,6 +428,7 @@ def test_command(tmp_path, monkeypatch, work, results, plain_section):
             "--design quotient/cosquad: unknown model; use one of blinn, ggx, phong",
         ),
         (["--report", "nothing"], "--report nothing: is not a report; make one with `blysk bench FOLDER`"),
+        (["--docs", "nothing"], "--docs nothing: holds no documents; make them with `make docs`"),
         (["-o", "no/site"], "no/site: cannot be written, there is no folder no; make the folder first"),
     ],
 )
