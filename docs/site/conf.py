@@ -32,6 +32,8 @@ html_title = f"{project} {version}"
 html_copy_source = False
 html_static_path = ["static"]
 html_css_files = ["site.css"]
+# The summaries would be fetched, which pages from disk cannot do.
+html_show_search_summary = False
 html_show_sphinx = False
 html_show_copyright = False
 html_theme_options = {"top_of_page_buttons": []}

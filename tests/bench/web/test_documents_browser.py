@@ -33,7 +33,7 @@ def test_search_versions_and_the_live_page(watching, documents, tmp_path):
     (site / "index.html").write_text("<title>live</title>")
     with watching() as (new_page, errors, _):
         page = new_page((1280, 800), 30)
-        page.goto((site / "docs" / "latest" / "search.html?q=turntable").as_uri())
+        page.goto((site / "docs" / "latest" / "search.html").as_uri() + "?q=turntable")
         page.wait_for_selector("ul.search li a[href*='function-turntable']")
         names = page.locator("#versions a").all_text_contents()
         assert names[0] == "latest"
