@@ -281,10 +281,15 @@ class VerilogBench:
         return Found(unpack(shapes.o, words), cycles, counted)
 
 
+WITH_ZEROS = ("results",)
+"""Names of memories that keep their zeros in emitted text: results of the vertex sort, which reads a word
+before it is written."""
+
+
 def without_initial_values(text: str, keep: tuple[int, ...] = ()) -> str:
     """Verilog whose registers and written memories begin undefined, as in a device that sets none of them.
 
-    Memories that nothing writes are tables, and keep their words.
+    Memories that nothing writes are tables, and keep their words. So do memories of `WITH_ZEROS`.
 
     Parameters
     ----------
@@ -300,6 +305,7 @@ def without_initial_values(text: str, keep: tuple[int, ...] = ()) -> str:
         written = set(re.findall(r"^\s+(\w+)\[.*\] <= ", body, re.MULTILINE))
         sizes = dict(re.findall(r"^  reg (?:\[\d+:0\] )?(\w+) \[(\d+):0\];", body, re.MULTILINE))
         written -= {name for name in written if int(sizes.get(name, -1)) + 1 in keep}
+        written -= set(WITH_ZEROS)
 
         def block(found: re.Match) -> str:
             return "" if found[1] in written else found[0]
