@@ -66,7 +66,8 @@ def _told(found: Absorbed) -> str:
     return (
         f"{found.removed:,} flip-flops are removed: registers of {found.operands} operands and "
         f"{found.products} products are inside multipliers, and of {found.words} words inside block RAMs. "
-        f"{found.inverters} look-up tables invert an enable; {found.carries} carries are cut off."
+        f"{found.inverters} look-up tables invert an enable; {found.carries} carries are cut off. "
+        f"{found.tables} look-up tables are removed: they are inside adders."
     )
 
 
@@ -78,8 +79,9 @@ def command(netlist, top, output):
     """Move registers into the multipliers and block RAMs of your netlist for ECP5.
 
     Run it between Yosys and nextpnr. The netlist is flat, and mapped by synth_ecp5. Yosys leaves the
-    registers beside a multiplier outside, and nextpnr does not move them. The result does the same in each
-    cycle. blysk fpga runs the same step. Multipliers and block RAMs with registers inside stay as they are.
+    registers beside a multiplier outside, and nextpnr does not move them. Look-up tables in front of adders
+    move into the adders where they fit. The result does the same in each cycle. blysk fpga runs the same
+    step. Multipliers and block RAMs with registers inside stay as they are.
 
     nextpnr does not time paths between registers on both sides of a multiplier. Do not clock a design with
     these paths above 250 MHz.

@@ -4,16 +4,20 @@ An ECP5 multiplier, MULT18X18D, has registers for each operand and for the produ
 register for the word that it reads. Yosys uses none of these registers. `absorb_registers` takes Yosys's JSON
 netlist. It moves flip-flops directly before or behind a multiplier into the multiplier, and flip-flops behind
 a block RAM into the block RAM. It also disconnects the last carry of a chain if the carry has no reader. Else
-nextpnr would add a pair of look-up tables for it. Nothing else of the netlist changes, and its function stays
-the same in every cycle from power-up on.
+nextpnr would add a pair of look-up tables for it. `absorb_tables` moves look-up tables into adders. Nothing
+else of the netlist changes, and its function stays the same in every cycle from power-up on.
 """
 
 from collections import defaultdict
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass
+from pathlib import Path
 from typing import Any
 
-__all__ = ["Absorbed", "absorb_registers"]
+from blysk.bench.tools import absorb_tables as tables
+from blysk.bench.tools.absorb_tables import absorb_tables
+
+__all__ = ["Absorbed", "absorb_registers", "text_of_step"]
 
 _MULTIPLIER, _FLIP_FLOP = "MULT18X18D", "TRELLIS_FF"
 
@@ -48,6 +52,8 @@ class Absorbed:
         Read ports of block RAMs that have a register inside.
     carries : int
         Chains whose last carry was disconnected.
+    tables : int
+        Look-up tables that moved into adders.
     """
 
     operands: int = 0
@@ -57,6 +63,7 @@ class Absorbed:
     closed: int = 0
     words: int = 0
     carries: int = 0
+    tables: int = 0
 
     def as_dict(self) -> dict[str, int]:
         """The figures under stable names."""
@@ -375,9 +382,10 @@ def absorb_registers(netlist: Mapping[str, Any], top: str = "top") -> tuple[dict
     netlist : dict
         The changed netlist. Its multipliers use ``REG_INPUTA``, ``REG_INPUTB`` and ``REG_OUTPUT``, with clock
         ``CLK0``, enables ``CE0`` to ``CE2``, and the constant 0 at reset ``RST0``. Its block RAMs use
-        ``REGMODE`` and ``OCE``. Its carry chains have no unread ``COUT`` at the end.
+        ``REGMODE`` and ``OCE``. Its carry chains have no unread ``COUT`` at the end. Adders use more inputs
+        of ``CCU2C``.
     absorbed : Absorbed
-        Counts of the moved registers.
+        Counts of the moved registers and tables.
     """
     module = netlist["modules"][top]
     work = _Netlist(module)
@@ -391,6 +399,12 @@ def absorb_registers(netlist: Mapping[str, Any], top: str = "top") -> tuple[dict
     words = sum(work.absorb_words(name) for name in work.without_registers(_MEMORY))
     chains = [name for name, cell in work.cells.items() if cell["type"] == _CARRY]
     carries = sum(work.end_carry(name) for name in chains)
+    moved = absorb_tables(work.cells, work.ports)
     modules = {**netlist["modules"], top: {**module, "cells": work.cells}}
-    found = Absorbed(operands, products, work.removed, len(work.inverted), closed, words, carries)
+    found = Absorbed(operands, products, work.removed, len(work.inverted), closed, words, carries, moved)
     return {**netlist, "modules": modules}, found
+
+
+def text_of_step() -> str:
+    """Text of the files of this step, for the keys of kept results."""
+    return "".join(Path(path).read_text(encoding="utf-8") for path in (__file__, tables.__file__))

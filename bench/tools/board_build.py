@@ -12,8 +12,7 @@ from typing import Any
 
 from amaranth.hdl import Elaboratable
 
-from blysk.bench.tools import absorb_registers as absorbing
-from blysk.bench.tools.absorb_registers import absorb_registers
+from blysk.bench.tools.absorb_registers import absorb_registers, text_of_step
 from blysk.bench.tools.boards import Board, packages_missing
 from blysk.bench.tools.families import ECP5, signal_name
 from blysk.bench.tools.kept_builds import KeptBuild
@@ -224,7 +223,7 @@ def build(
             (folder / file).write_bytes(text if isinstance(text, bytes) else text.encode())
         script = _script(rates["sync"])
         options = repr((board.options, _LAYOUT, _SETTINGS, versions_of(ECP5)))
-        step = Path(absorbing.__file__).read_bytes()
+        step = text_of_step()
         kept = KeptBuild((plan.files["top.il"], plan.files["top.lpf"], script, options, step))
         progress("mapping")
         if not kept.take(folder, "netlist.json"):

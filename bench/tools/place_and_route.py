@@ -18,8 +18,7 @@ from amaranth.hdl import Const, Module, Shape, Signal, Value
 from amaranth.lib import wiring
 from amaranth.lib.wiring import Out
 
-from blysk.bench.tools import absorb_registers as absorbing
-from blysk.bench.tools.absorb_registers import Absorbed, absorb_registers
+from blysk.bench.tools.absorb_registers import Absorbed, absorb_registers, text_of_step
 from blysk.bench.tools.defaults import SEEDS
 from blysk.bench.tools.families import ECP5, Family, Parts, Place, kind_of_cell, signal_name
 from blysk.bench.tools.kept_builds import KeptBuild
@@ -370,7 +369,7 @@ def lay_out(
     tools = versions_of(family)
     netlist = rtlil.convert(Registered(component), name="top", emit_src=False)
     absorb = absorb and family.limit is not None
-    step = Path(absorbing.__file__).read_text(encoding="utf-8") if absorb else ""
+    step = text_of_step() if absorb else ""
     parts = (netlist, MAP_BEFORE, MAP_AFTER, YOSYS, step, repr(family), repr(tools))
     key = hashlib.sha256("\0".join(parts).encode()).hexdigest()
     folder = cache_folder() / "fpga"
