@@ -194,6 +194,9 @@ class EdgeSetupUnit(PipelinedUnit):
         load = [age.divide for age in ages]
         rest, word = Signal(signed(bits + 1), name=f"rest_{number}"), Signal(bits, name=f"word_{number}")
         negative = Signal(name=f"negative_{number}")
+        # Whether the next step subtracts: the remainder is not negative. As a register of its own this bit
+        # needs no inverter, and the choice of the divisor's sign goes into the adder.
+        subtracts = Signal(name=f"subtracts_{number}", init=1)
         divisor, triple = (Signal(bits + 2 * k, name=f"{name}_{number}") for k, name in _DIVISORS)
         width, height = (chosen([edges[k][part] for k in members], load) for part in range(2))
         loads = self.register(m, _any(self.at(age - 1) for age in load), f"loads_{number}")
@@ -202,12 +205,13 @@ class EdgeSetupUnit(PipelinedUnit):
                 rest.eq(width[-1].replicate(bits + 1)),
                 word.eq(width),
                 negative.eq(width[-1]),
+                subtracts.eq(~width[-1]),
                 divisor.eq(height),
                 triple.eq(height + (height << 1)),
             ]
         with m.Else():
-            after, quotient = self._steps(rest, word, divisor, triple)
-            m.d.sync += [rest.eq(after), word.eq(quotient)]
+            after, quotient = self._steps(subtracts, rest, word, divisor, triple)
+            m.d.sync += [rest.eq(after), word.eq(quotient), subtracts.eq(after >= 0)]
 
         # The remainder is corrected, and gives the start.
         corrected = Mux(rest < 0, rest + divisor, rest)[:bits]
@@ -296,25 +300,25 @@ class EdgeSetupUnit(PipelinedUnit):
             Signal(FRACTION_BITS, name="fraction_word"),
         )
         divisors = [Signal(bits + 2 * k, name=f"fraction_{name}") for k, name in _DIVISORS]
-        nothing = Const(0, FRACTION_BITS)
-        after, quotient = self._steps(error_step, nothing, height, triple)
+        subtracts, nothing = Signal(name="fraction_subtracts", init=1), Const(0, FRACTION_BITS)
+        after, quotient = self._steps(Const(1), error_step, nothing, height, triple)
         with m.If(self.at(self._ages[0].start)):
-            m.d.sync += [rest.eq(after), word.eq(quotient), divisors[0].eq(height), divisors[1].eq(triple)]
+            m.d.sync += [rest.eq(after), word.eq(quotient), subtracts.eq(after >= 0)]
+            m.d.sync += [divisors[0].eq(height), divisors[1].eq(triple)]
         with m.Else():
-            after, quotient = self._steps(rest, word, *divisors)
-            m.d.sync += [rest.eq(after), word.eq(quotient)]
+            after, quotient = self._steps(subtracts, rest, word, *divisors)
+            m.d.sync += [rest.eq(after), word.eq(quotient), subtracts.eq(after >= 0)]
         return word
 
-    def _steps(self, rest: Value, word: Value, divisor: Value, triple: Value) -> tuple[Value, Value]:
+    def _steps(
+        self, subtract: Value, rest: Value, word: Value, divisor: Value, triple: Value
+    ) -> tuple[Value, Value]:
         """Make one or two steps of a division. Returns ``rest`` and ``word``.
 
-        A step shifts a bit of ``word`` into ``rest``, and subtracts or adds the divisor. The sign of ``rest``
-        decides. The second step is computed from ``rest`` for both signs of the first result, with one or
-        three times the divisor.
+        A step shifts a bit of ``word`` into ``rest``, and subtracts or adds the divisor. ``subtract`` is 1 if
+        ``rest`` is not negative. The second step is computed from ``rest`` for both signs of the first
+        result, with one or three times the divisor.
         """
-        # An unsigned number would make the comparison with 0 constant.
-        subtract = rest >= 0 if rest.shape().signed else Const(1)
-
         size = len(divisor) + 1
 
         def added(bits, less, more):
