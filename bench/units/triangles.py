@@ -64,7 +64,8 @@ def sorted_of(beats: Mapping) -> SortedTriangles:
         name: beats.get(name, np.zeros(len(triangles), dtype=np.int64)) for name in ("area", "right", "flip")
     }
     right, flip = (words[name].astype(bool) for name in ("right", "flip"))
-    return SortedTriangles(triangles, words["area"], right, flip, np.arange(len(triangles)))
+    source, order = np.arange(len(triangles)), np.tile(np.arange(3), (len(triangles), 1))
+    return SortedTriangles(triangles, words["area"], right, flip, source, order)
 
 
 def edges_of(beats: Mapping) -> Edges:

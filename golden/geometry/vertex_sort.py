@@ -31,6 +31,8 @@ class SortedTriangles:
         Whether the normals have to be negated.
     source : int64 array, shape (T,)
         Index of each triangle among the triangles before the sort.
+    order : int64 array, shape (T, 3)
+        For each sorted corner its index among the corners before the sort.
     """
 
     triangles: Triangles
@@ -38,15 +40,30 @@ class SortedTriangles:
     right: np.ndarray
     flip: np.ndarray
     source: np.ndarray
+    order: np.ndarray
 
     def __len__(self) -> int:
         return len(self.area)
 
     @property
     def beats(self) -> dict[str, np.ndarray]:
-        """Fields of the output beats of the hardware, by name: arrays of codes."""
-        beats = self.triangles.beats | {"area": self.area, "right": self.right, "flip": self.flip}
+        """Fields of the output beats of the hardware, by name: arrays of codes.
+
+        Coordinates are sorted. Attributes stay in the order before the sort, with the indices ``top`` and
+        ``bottom`` of the first and the last sorted corner.
+        """
+        beats = self.triangles.beats | self.attributes
+        beats |= {"area": self.area, "right": self.right, "flip": self.flip}
         return {name: values for name, values in beats.items() if name != "two_sided"}
+
+    @property
+    def attributes(self) -> dict[str, np.ndarray]:
+        """Fields of the beats with the attributes, in the order before the sort, and with both indices."""
+        back = np.argsort(self.order, axis=1)
+        rows = np.arange(len(self))[:, np.newaxis]
+        names = [name for name in self.triangles.corners if name not in "xy"]
+        given = {name: getattr(self.triangles, name)[rows, back] for name in names}
+        return given | {"top": self.order[:, 0], "bottom": self.order[:, 2]}
 
 
 @dataclass(frozen=True)
@@ -188,5 +205,6 @@ class VertexSort:
             right=area[drawn] < 0,
             flip=back[drawn] & ((frame.back_faces == "flip") | culls),
             source=source[drawn],
+            order=order[drawn],
         )
         return result, counts

@@ -11,6 +11,7 @@ from blysk.hdl.core.fixed import FixedShape
 from blysk.hdl.core.stream import skid_buffer
 from blysk.hdl.core.views import copy
 from blysk.hdl.geometry.surface_words import attribute_count, corner_surface_shape
+from blysk.hdl.geometry.triangles import in_order, order_shape
 
 __all__ = ["AttributeSerialiserUnit", "corner_attributes_shape", "serial_attribute_shape"]
 
@@ -19,13 +20,14 @@ _KNOWN = 8
 
 
 def corner_attributes_shape(surface: AttributeSpans | None = None) -> data.StructLayout:
-    """Shape of the attributes of three sorted corners."""
+    """Shape of the attributes of three corners, and the order of the corners."""
     component = FixedShape(ATTRIBUTE)
     return data.StructLayout(
         {
             "depth": data.ArrayLayout(FixedShape(DEPTH), 3),
             "normal": data.ArrayLayout(data.ArrayLayout(component, 3), 3),
             **corner_surface_shape(surface),
+            **order_shape(),
         }
     )
 
@@ -56,7 +58,7 @@ class AttributeSerialiserUnit(wiring.Component):
     Members
     -------
     i : :py:`In(stream.Signature(corner_attributes_shape(surface)))`
-        Attributes of triangles with sorted corners.
+        Attributes of triangles with corners in any order, and the order of the corners.
     o : :py:`Out(stream.Signature(serial_attribute_shape()))`
         Components x, y, z of N/W, the depth, then the surface.
 
@@ -73,7 +75,10 @@ class AttributeSerialiserUnit(wiring.Component):
         )
 
     def elaborate(self, platform):
-        """The corners' words in rings, which turn once for the bound and once more for the output."""
+        """The corners' words in rings, which turn once for the bound and once more for the output.
+
+        The first words of the rings are put in order.
+        """
         m = Module()
         count = attribute_count(self._surface)
         corners = [
@@ -82,7 +87,11 @@ class AttributeSerialiserUnit(wiring.Component):
         first = max(_KNOWN, count + ATTRIBUTES)
         step, advance = Signal(range(first + count), name="step"), Signal(name="advance")
         valid, result = Signal(name="valid"), Signal(self.o.payload.shape(), name="result")
-        least = self._least(m, step, [words[0] for words in corners])
+        top, bottom = (Signal(2, name=f"{name}_corner", reset_less=True) for name in order_shape())
+        heads = [Signal(FixedShape(ATTRIBUTE), name=f"head_{name}") for name in ("first", "middle", "last")]
+        for head, word in zip(heads, in_order(top, bottom, [words[0] for words in corners]), strict=True):
+            m.d.comb += Value.cast(head).eq(word)
+        least = self._least(m, step, heads)
         if self._skid:
             m.d.comb += advance.eq(skid_buffer(m, self.o, valid, result))
         else:
@@ -94,6 +103,7 @@ class AttributeSerialiserUnit(wiring.Component):
         m.d.comb += self.i.ready.eq(free)
         with m.If(free):
             m.d.sync += [step.eq(self.i.valid), free.eq(~self.i.valid)]
+            m.d.sync += [top.eq(self.i.payload.top), bottom.eq(self.i.payload.bottom)]
             for k, words in enumerate(corners):
                 values = [Value.cast(value) for value in self.i.payload.normal[k]]
                 # The depth minus half its range, made by inverting its first bit.
@@ -113,8 +123,8 @@ class AttributeSerialiserUnit(wiring.Component):
                     ]
         with m.If(advance):
             m.d.sync += [valid.eq(gives), result.least.eq(least)]
-            for name, words in zip(("first", "middle", "last"), corners, strict=True):
-                m.d.sync += copy(result[name], words[0])
+            for name, head in zip(("first", "middle", "last"), heads, strict=True):
+                m.d.sync += copy(result[name], head)
         return m
 
     def _least(self, m: Module, step: Signal, words: list) -> Signal:

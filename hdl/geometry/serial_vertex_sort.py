@@ -1,18 +1,20 @@
 """Vertex sort of the compact style: corners exchanged in turns, the area digit by digit."""
 
-from amaranth.hdl import Cat, Const, Module, Mux, Signal, Value, signed
+from amaranth.hdl import Cat, Const, Module, Mux, Signal, Value, signed, unsigned
 from amaranth.lib import data, wiring
 
 from blysk.golden.albedo.attribute_spans import AttributeSpans
 from blysk.golden.geometry.edge_setup import X_BITS
 from blysk.golden.geometry.triangles import GRID, Grid
 from blysk.golden.reference.scene import BACK_FACES
+from blysk.hdl.core.fixed import FixedShape
 from blysk.hdl.core.views import copy, copy_fields
 from blysk.hdl.geometry.surface_words import placement_of
 from blysk.hdl.geometry.triangles import (
     corners_shape,
     count_events,
     first_centre,
+    order_shape,
 )
 from blysk.hdl.geometry.vertex_sort import PAIRS, sort_members
 
@@ -26,7 +28,8 @@ class SerialVertexSortUnit(wiring.Component):
     """Sorts corners, finds the area, and drops triangles. `VertexSort` without its test of centres is the
     bit-accurate model.
 
-    One triangle is inside. Neighbouring corners are compared in three cycles, and exchanged a cycle later. At
+    One triangle is inside. Neighbouring corners are compared in three cycles, and their coordinates are
+    exchanged a cycle later. Attributes are put in order later (`AttributeSerialiserUnit`). At
     the same time the triangle's box is compared with the picture. Then the unit sums
     ``a = (x1 - x0)(y2 - y0) - (x2 - x0)(y1 - y0)`` in n digits of four bits of the heights, from the first
     digit on. It takes two Booth digits of each product a cycle. Low triangles have fewer digits. Results are
@@ -66,7 +69,13 @@ class SerialVertexSortUnit(wiring.Component):
     def elaborate(self, platform):
         """The steps and the counters."""
         m = Module()
-        corners = [Signal(_corner_shape(self.grid, self.surface), name=f"corner_{k}") for k in range(3)]
+        corners = [Signal(_corner_shape(self.grid), name=f"corner_{k}") for k in range(3)]
+        shape = corners_shape(self.grid, self.surface).items()
+        attributes = Signal(
+            data.StructLayout({name: words for name, words in shape if name not in "xy"}),
+            name="attributes",
+            reset_less=True,
+        )
         material, odd = Signal.like(self.i.payload.material), Signal(name="odd")
         places = {
             name: Signal(shape, name=name, reset_less=True)
@@ -84,6 +93,7 @@ class SerialVertexSortUnit(wiring.Component):
             odd.eq(0),
             two_sided.eq(given.two_sided),
             *(copy(place, given[name]) for name, place in places.items()),
+            *copy_fields(attributes, given),
         ]
         with m.Switch(step):
             with m.Case(0):
@@ -101,7 +111,8 @@ class SerialVertexSortUnit(wiring.Component):
         m.d.comb += self.i.ready.eq(takes)
         order = self._exchange(m, corners, odd, step, takes)
         self._box(m, corners, order, step, covered, digits)
-        zero, culled = self._area(m, corners, (material, two_sided, places), odd, digits, leaves, ends)
+        tag = material, two_sided, places, attributes
+        zero, culled = self._area(m, corners, tag, odd, digits, leaves, ends)
         count_events(m, self.status, empty=(step == 4) & ~covered, zero_area=zero, culled=culled)
         return m
 
@@ -139,7 +150,7 @@ class SerialVertexSortUnit(wiring.Component):
         given = self.i.payload
         moving = outer, outer | inner, inner
         for k, (corner, neighbour, moves) in enumerate(zip(corners, following, moving, strict=True)):
-            taken = Cat(Value.cast(given[name][k]) for name in corner.shape().members)
+            taken = Cat(Value.cast(given.x[k]), Value.cast(given.y[k]), Const(k, 2))
             with m.If(takes | (turn & moves)):
                 m.d.sync += Value.cast(corner).eq(Mux(takes, taken, neighbour))
         return [turn, same, other]
@@ -182,12 +193,12 @@ class SerialVertexSortUnit(wiring.Component):
         """The area. Returns whether a triangle without area ends now, and whether a culled triangle
         ends now.
 
-        ``tag`` has the index of the material, whether the triangle is two-sided, and the place of its
-        texture.
+        ``tag`` has the index of the material, whether the triangle is two-sided, the place of its texture,
+        and the attributes.
         """
-        (material, is_two_sided, places), two_sided = tag, Signal(name="two_sided_area")
+        (material, is_two_sided, places, attributes), two_sided = tag, Signal(name="two_sided_area")
         grid, result = self.grid, self.o.payload
-        members = corners_shape(grid, self.surface) | {"material": material.shape()}
+        members = corners_shape(grid, self.surface) | order_shape() | {"material": material.shape()}
         words = Signal(data.StructLayout(members | placement_of(self.surface)), name="sorted")
         total_bits, most = 2 * grid.bits + 1, _largest_digits(grid)
         total = Signal(signed(total_bits), name="total")
@@ -224,7 +235,9 @@ class SerialVertexSortUnit(wiring.Component):
             m.d.sync += [left.eq(left - 1), busy.eq(left != 0)]
         kept = [
             *(odd_area.eq(odd), two_sided.eq(is_two_sided), words.material.eq(material)),
-            *self._sorted(words, corners),
+            *(copy(words[name][k], corners[k][name]) for name in "xy" for k in range(3)),
+            *(words.top.eq(corners[0].index), words.bottom.eq(corners[2].index)),
+            *copy_fields(words, attributes, attributes.shape().members),
             *(copy(words[name], place) for name, place in places.items()),
         ]
         m.d.comb += kept
@@ -261,12 +274,6 @@ class SerialVertexSortUnit(wiring.Component):
         ]
         return done & zero, done & culled & ~zero
 
-    @staticmethod
-    def _sorted(result, corners):
-        for k, corner in enumerate(corners):
-            for name in corner.shape().members:
-                yield copy(result[name][k], corner[name])
-
 
 def _booth_digit(value: Value, bits: Value, negative: bool) -> tuple[Value, Value]:
     """Value times a Booth digit (`booth_term`), negated if ``negative``; without a carry.
@@ -280,9 +287,10 @@ def _booth_digit(value: Value, bits: Value, negative: bool) -> tuple[Value, Valu
     return (size[:] ^ minus.replicate(len(size))).as_signed(), minus
 
 
-def _corner_shape(grid: Grid, surface: AttributeSpans | None) -> data.StructLayout:
-    members = corners_shape(grid, surface).items()
-    return data.StructLayout({name: shape.elem_shape for name, shape in members})
+def _corner_shape(grid: Grid) -> data.StructLayout:
+    """Coordinates of a corner, and its index before the sort."""
+    coordinate = FixedShape(grid.coordinate)
+    return data.StructLayout({"x": coordinate, "y": coordinate, "index": unsigned(2)})
 
 
 def _largest_digits(grid: Grid) -> int:

@@ -1,6 +1,8 @@
 """Shapes of triangles, of the settings of a frame, and of counters."""
 
-from amaranth.hdl import Module, Signal, Value, ValueLike, signed, unsigned
+from collections.abc import Sequence
+
+from amaranth.hdl import Module, Mux, Signal, Value, ValueLike, signed, unsigned
 from amaranth.lib import data
 
 from blysk.golden.albedo.attribute_spans import AttributeSpans
@@ -23,6 +25,8 @@ __all__ = [
     "counters_shape",
     "first_centre",
     "frame_shape",
+    "in_order",
+    "order_shape",
     "tag_shape",
     "triangle_shape",
 ]
@@ -58,6 +62,20 @@ def triangle_shape(grid: Grid = GRID, surface: AttributeSpans | None = None) -> 
 def tag_shape() -> dict:
     """Members that go with a triangle to its scanlines: long edge on the right, normals negated, material."""
     return {"right": unsigned(1), "flip": unsigned(1), "material": unsigned(MATERIAL_BITS)}
+
+
+def order_shape() -> dict:
+    """Members of an order of three corners: indices of the first and of the last corner."""
+    return {"top": unsigned(2), "bottom": unsigned(2)}
+
+
+def in_order(top: Value, bottom: Value, corners: Sequence[ValueLike]) -> list[Value]:
+    """Words of three corners in the order that `order_shape` describes."""
+    words = [Value.cast(word) for word in corners]
+    # The exclusive or of the three indices is 3.
+    return [
+        Mux(index[1], words[2], Mux(index[0], words[1], words[0])) for index in (top, ~(top ^ bottom), bottom)
+    ]
 
 
 def frame_shape() -> data.StructLayout:

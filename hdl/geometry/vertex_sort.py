@@ -21,6 +21,8 @@ from blysk.hdl.geometry.triangles import (
     counters_shape,
     first_centre,
     frame_shape,
+    in_order,
+    order_shape,
     tag_shape,
     triangle_shape,
 )
@@ -45,9 +47,13 @@ _RESERVED = 4
 
 
 def sorted_triangle_shape(grid: Grid = GRID, surface: AttributeSpans | None = None) -> data.StructLayout:
-    """Shape of `SortedTriangles.beats`: sorted corners, twice the area, the tag, place of the texture."""
+    """Shape of `SortedTriangles.beats`: corners, their order, twice the area, the tag, place of the texture.
+
+    Only the coordinates are sorted.
+    """
     area = {"area": unsigned(2 * grid.bits)}
-    return data.StructLayout(corners_shape(grid, surface) | area | tag_shape() | placement_of(surface))
+    members = corners_shape(grid, surface) | order_shape() | area | tag_shape()
+    return data.StructLayout(members | placement_of(surface))
 
 
 def sort_members(grid: Grid, surface: AttributeSpans | None) -> dict[str, wiring.Member]:
@@ -67,7 +73,8 @@ class VertexSortUnit(wiring.Component):
     pipeline compares the corners, compares the box with the picture, and finds
     ``a = (x1 - x0)(y2 - y0) - (x2 - x0)(y1 - y0)`` from the corners in the given order. Results of drawn
     triangles wait in a second memory. A drawn triangle is read from the first memory, and a multiplexer
-    puts its corners in order. So a dropped triangle takes no other unit's time.
+    puts its coordinates in order. Its attributes are put in order later, one after the other
+    (`AttributeSerialiserUnit`). So a dropped triangle takes no other unit's time.
 
     The unit takes a triangle in each cycle, drawn or dropped. `VertexSort.cycles` has the exceptions: if a
     difference of coordinates is 512 pixels or more, each product takes four cycles, from the halves of its
@@ -156,7 +163,7 @@ class VertexSortUnit(wiring.Component):
         culled, decides = back & culls & ~two_sided, there & goes
         found = Signal(self._found_shape(), name="found")
         m.d.comb += [
-            *(found.first.eq(first), found.last.eq(final), found.area.eq(area)),
+            *(found.top.eq(first), found.bottom.eq(final), found.area.eq(area)),
             *(found.right.eq(negative ^ odd), found.flip.eq(back & (flips | culls))),
         ]
         solid = covered & ~zero & ~culled
@@ -267,10 +274,9 @@ class VertexSortUnit(wiring.Component):
         return total, ~wide | part.all()
 
     def _found_shape(self) -> data.StructLayout:
-        """Results of a drawn triangle: indices of the first and the last corner, the tag, twice the area."""
-        corners = {"first": unsigned(2), "last": unsigned(2)}
+        """Results of a drawn triangle: the order of the corners, the tag, twice the area."""
         flags = {"right": unsigned(1), "flip": unsigned(1)}
-        return data.StructLayout(corners | flags | {"area": unsigned(2 * self.grid.bits)})
+        return data.StructLayout(order_shape() | flags | {"area": unsigned(2 * self.grid.bits)})
 
     def _keep(self, m: Module, takes: Value, room: Signal, decides: Value, drawn: Value, found) -> None:
         """The memories of triangles and of results, and the output."""
@@ -309,29 +315,26 @@ class VertexSortUnit(wiring.Component):
         coming, leaving = (
             Signal(found.shape(), name=name, reset_less=True) for name in ("coming", "leaving")
         )
-        middle = Signal(2, name="middle", reset_less=True)
         with m.If(reads):
             m.d.sync += first.eq(first + 1)
         with m.If(steps):
             m.d.sync += [
                 *(read.eq(reads), offered.eq(read)),
                 *(coming.eq(head.data[bits:]), leaving.eq(coming)),
-                # The exclusive or of the three indices is 3.
-                middle.eq(~(coming.first ^ coming.last)),
             ]
         with m.Elif(self.o.ready):
             m.d.sync += offered.eq(0)
         stored = data.View(layout, word)
         m.d.comb += [
             self.o.valid.eq(offered),
-            *copy_fields(shown, stored, rest),
-            *copy_fields(shown, leaving, ("right", "flip", "area")),
+            *copy_fields(shown, stored, [name for name in layout.members if name not in "xy"]),
+            *copy_fields(shown, leaving, found.shape().members),
         ]
-        for name in members:
-            corners = [Value.cast(corner) for corner in stored[name]]
-            for k, index in enumerate((leaving.first, middle, leaving.last)):
-                chosen = Mux(index[1], corners[2], Mux(index[0], corners[1], corners[0]))
-                m.d.comb += Value.cast(shown[name][k]).eq(chosen)
+        for name in "xy":
+            for to, word in zip(
+                shown[name], in_order(leaving.top, leaving.bottom, stored[name]), strict=True
+            ):
+                m.d.comb += Value.cast(to).eq(word)
 
 
 def _ends(before: Sequence, values: Sequence) -> tuple[Value, Value]:

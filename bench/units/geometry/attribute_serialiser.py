@@ -13,12 +13,19 @@ __all__ = ["RECORD"]
 
 
 def _expect(unit, case):
-    return AttributeSerialiser().compute(triangles_with(**case.beats))
+    beats = case.beats
+    order = np.stack((beats["top"], 3 - beats["top"] - beats["bottom"], beats["bottom"]), axis=1)
+    rows = np.arange(len(order))[:, np.newaxis]
+    return AttributeSerialiser().compute(
+        triangles_with(**{name: beats[name][rows, order] for name in ("depth", "normal")})
+    )
 
 
 def _case(rng, count, spread):
     triangles = random_triangles(rng, count, spread=spread)
-    return Case({"depth": triangles.depth, "normal": triangles.normal})
+    order = rng.permuted(np.tile(np.arange(3), (count, 1)), axis=1)
+    words = {"depth": triangles.depth, "normal": triangles.normal}
+    return Case(words | {"top": order[:, 0], "bottom": order[:, 2]})
 
 
 def _near(unit, rng, count):
