@@ -3,8 +3,10 @@ allows."""
 
 import os
 import re
+import shutil
 import subprocess
 import sys
+import tarfile
 import tomllib
 import zipfile
 from itertools import chain
@@ -43,17 +45,27 @@ def run(*command: object, **options) -> str:
     return done.stdout
 
 
-@pytest.fixture(scope="module")
-def wheel(tmp_path_factory):
-    folder = tmp_path_factory.mktemp("wheel")
-    # A copy of the committed files, because a build leaves folders behind, and other files do not belong in
-    # the wheel.
+def committed():
+    """Names of the committed files that are still there."""
     files = run("git", "ls-files", "-z", cwd=PROJECT).split("\0")[:-1]
-    for name in files:
-        if (PROJECT / name).is_file():
-            (folder / "source" / name).parent.mkdir(parents=True, exist_ok=True)
-            (folder / "source" / name).write_bytes((PROJECT / name).read_bytes())
-    run(sys.executable, "-m", "pip", "wheel", "-q", "--no-deps", "-w", folder, folder / "source")
+    return [name for name in files if (PROJECT / name).is_file()]
+
+
+@pytest.fixture(scope="module")
+def source(tmp_path_factory):
+    """A copy of the committed files, because a build leaves folders behind, and other files do not belong in
+    the wheel."""
+    folder = tmp_path_factory.mktemp("source")
+    for name in committed():
+        (folder / name).parent.mkdir(parents=True, exist_ok=True)
+        shutil.copy(PROJECT / name, folder / name)
+    return folder
+
+
+@pytest.fixture(scope="module")
+def wheel(source, tmp_path_factory):
+    folder = tmp_path_factory.mktemp("wheel")
+    run(sys.executable, "-m", "pip", "wheel", "-q", "--no-deps", "-w", folder, source)
     (path,) = folder.glob("*.whl")
     return path
 
@@ -83,6 +95,33 @@ def test_wheel_holds_the_packages_and_no_more(wheel):
     assert unwanted == ["blysk/sim/frames/testbench.py", "blysk/sim/frames/templates/test_core.py"]
     # Only sources; data would be larger.
     assert largest < 32_000
+    # Every file that is no module, and that a command may read.
+    layers = ("blysk", "golden", "hdl", "sim", "bench")
+    data = {name for name in committed() if name.startswith(layers) and not name.endswith(".py")}
+    data = {name for name in data if not name.startswith("bench/quality/")}
+    assert len(data) > 10
+    assert {f"blysk/{name}".replace("blysk/blysk/", "blysk/") for name in data} - set(names) == set()
+
+
+@pytest.mark.ci
+@pytest.mark.long
+def test_source_archive_has_every_file_and_makes_the_same_wheel(source, wheel, tmp_path):
+    """The wheel is built from the unpacked archive, without the clone."""
+    pytest.importorskip("build", reason="build is not installed")
+    build = ("-m", "build", "--no-isolation", "-o", tmp_path)
+    run(sys.executable, *build, source)
+    (archive,), (other,) = tmp_path.glob("*.tar.gz"), tmp_path.glob("*.whl")
+    with tarfile.open(archive) as files:
+        names = {name.partition("/")[2] for name in files.getnames()}
+    assert set(committed()) - names == set()
+    added = {name.split("/")[0] for name in names - set(committed())} - {
+        name.split("/")[0] for name in committed()
+    }
+    assert added <= {"", "PKG-INFO", "setup.cfg", "blysk.egg-info"}
+    with zipfile.ZipFile(wheel) as one, zipfile.ZipFile(other) as two:
+        assert {name: one.read(name) for name in one.namelist()} == {
+            name: two.read(name) for name in two.namelist()
+        }
 
 
 @pytest.fixture(scope="module")
