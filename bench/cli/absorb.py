@@ -84,12 +84,12 @@ def command(netlist, top, output):
     step. Multipliers and block RAMs with registers inside stay as they are.
 
     nextpnr does not time paths between registers on both sides of a multiplier. Do not clock a design with
-    these paths above 250 MHz.
+    these paths above 250 MHz. docs/guide/fpga.md has the lines of ecp5.ys.
 
     \b
     Example:
         blysk verilog -o core.v
-        yosys -p "read_verilog core.v; synth_ecp5 -abc9 -top blysk -json core.json"
+        yosys -s ecp5.ys
         blysk absorb core.json -o absorbed.json
         nextpnr-ecp5 --25k --json absorbed.json --out-of-context --lpf-allow-unconstrained
     """

@@ -144,7 +144,7 @@ def test_missing_yosys_is_one_line_that_names_the_extra(refused, monkeypatch):
 
 
 class Parts(wiring.Component):
-    """A product without registers beside it, a FIFO in a small memory, a larger memory, and a counter."""
+    """A product without registers beside it, a FIFO in a small memory, a large table, and a counter."""
 
     i: In(stream.Signature(8))
     o: Out(stream.Signature(8))
@@ -157,15 +157,14 @@ class Parts(wiring.Component):
     def elaborate(self, platform):
         m = Module()
         connect_wide_fifo(m, "few", wiring.flipped(self.i), wiring.flipped(self.o), 16)
-        m.submodules.many = many = Memory(shape=16, depth=1024, init=[])
-        write, read = many.write_port(), many.read_port()
+        # Not written, because families differ in the word that is read at the edge of a write.
+        words = [k * 40503 % 65521 for k in range(1024)]
+        m.submodules.many = many = Memory(shape=16, depth=1024, init=words)
+        read = many.read_port()
         count = Signal(24)
         m.d.sync += count.eq(count + 1)
         m.d.comb += [
             self.product.eq(self.a * self.b),
-            write.addr.eq(self.b),
-            write.data.eq(self.a),
-            write.en.eq(1),
             read.addr.eq(self.a),
             self.word.eq(read.data),
             self.count.eq(count),
