@@ -22,7 +22,7 @@ LINT := import tomllib; of = tomllib.load(open("pyproject.toml", "rb"))["project
 	print(*of["optional-dependencies"]["lint"], *(one for one in of["dependencies"] if one.startswith(("click", "numpy"))), sep="\n")
 
 .PHONY: demo test test-quick test-all test-long test-ci prove prove-ci decided adversary mutants soak coverage bench \
-	pages docs site boards release lint style types clean
+	pages docs site paper boards release lint style types clean
 
 demo: $(VENV)/.installed
 	$(BIN)/blysk render teapot --size 640x480 --compare teapot.png
@@ -118,6 +118,12 @@ release: boards
 	tar -czf dist/blysk-$(VERSION)-site.tar.gz site
 	cd dist && $(SHA256) * > ../build/SHA256SUMS
 	mv build/SHA256SUMS dist
+
+# Measures the section of the report that the paper takes, with pictures of full size.
+paper: $(VENV)/.installed-bench
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check -e '.[paper]'
+	$(BIN)/blysk bench build/paper/report --only points
+	$(BIN)/python -m blysk.bench.quality.paper build/paper/report/report.json
 
 lint: style types
 
