@@ -51,7 +51,7 @@ EXPONENT = 100
 
 _STAGES = (
     ("span\nv, d, e", 0),
-    ("squares,\nlines", 4),
+    ("squares,\nlines", 5),
     ("sums\nm, w, l", 0),
     ("1/sqrt(q)\ntable, r²", 2),
     ("l r\nm r²", 2),
