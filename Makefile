@@ -122,7 +122,7 @@ release: boards
 # Measures the section of the report that the paper takes, with pictures of full size.
 paper: $(VENV)/.installed-bench
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check -e '.[paper]'
-	$(BIN)/blysk bench build/paper/report --only points
+	$(BIN)/blysk bench build/paper/report --only points --only rivals
 	$(BIN)/python -m blysk.bench.quality.paper build/paper/report/report.json
 
 lint: style types

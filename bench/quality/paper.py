@@ -36,6 +36,7 @@ __all__ = [
     "methods_of",
     "paper",
     "reference_texts",
+    "rivals_of",
 ]
 
 PROJECT = Path(__file__).parents[2]
@@ -192,6 +193,40 @@ def methods_of(points: Sequence[Mapping[str, Any]]) -> list[dict[str, Any]]:
     return sorted(rows, key=lambda row: (row["error"], row["cycles"]))
 
 
+def rivals_of(tables: Mapping[str, Mapping[str, Any]]) -> dict[str, Any]:
+    """Rows of the table of rivals: those of the report's section `rivals`, errors at exponent `EXPONENT`.
+
+    Parameters
+    ----------
+    tables : dict
+        Tables of the section.
+
+    Returns
+    -------
+    dict
+        ``meshes``, and ``rows`` with ``method``, ``multipliers`` with one light and with the most lights,
+        ``adders`` in bits, ``errors`` in LSB before rounding on each mesh. ``most`` is the number of lights.
+    """
+    parts, errors = tables["rivals-parts"]["rows"], tables["rivals-errors"]["rows"]
+    most = max(row["lights"] for row in parts)
+    found = {(row["method"], row["lights"]): row for row in parts}
+    largest: dict[str, dict[str, float]] = {}
+    for row in errors:
+        if row["exponent"] == EXPONENT:
+            largest.setdefault(row["method"], {})[row["mesh"]] = row["largest error before rounding, LSB"]
+    meshes = list(next(iter(largest.values())))
+    rows = [
+        {
+            "method": name,
+            "multipliers": [found[name, count]["multipliers"] for count in (1, most)],
+            "adders": found[name, 1]["adders, bits"],
+            "errors": [largest[name][mesh] for mesh in meshes],
+        }
+        for name in largest
+    ]
+    return {"meshes": meshes, "most": most, "rows": rows}
+
+
 def lights_of(methods: Sequence[str] = OF_LIGHTS, counts: Sequence[int] = LIGHTS) -> dict[str, Any]:
     """Multipliers of methods with the lobe `blinn` over the number of lights, counted in the netlist."""
     from blysk.sim.api.design import design
@@ -311,6 +346,7 @@ def data_of(report: Mapping[str, Any]) -> dict[str, Any]:
             "size": f"{settings['width']}x{settings['height']}",
             "exponent": EXPONENT,
         },
+        "rivals": rivals_of(report["sections"]["rivals"]["tables"]),
         "all_spans": documents_table(theory["quotient"], "| spans of up to |"),
         "found_spans": documents_table(theory["quotient"], "| | n = 1 | n = 10 |"),
         "geometry": documents_table(theory["geometry"], "| spans from | `blinn`, n = 10 |"),
@@ -371,7 +407,7 @@ def paper(
     show_default=True,
 )
 def _command(report: str, output: Path) -> None:
-    """Make the paper from the report.json of a report that has the section points."""
+    """Make the paper from the report.json of a report that has the sections points and rivals."""
     try:
         read = json.loads(Path(report).read_text(encoding="utf-8"))
         data_of(read)
@@ -379,7 +415,9 @@ def _command(report: str, output: Path) -> None:
         reason = (
             str(error) if isinstance(error, ValueError) and "report" in str(error) else "is not such a report"
         )
-        raise InputError(report, reason, "give the report.json of `blysk bench --only points`") from None
+        raise InputError(
+            report, reason, "give the report.json of `blysk bench --only points --only rivals`"
+        ) from None
     check_writable(output)
     size = data_of(read)["scene"]
     width, height = map(int, size["size"].split("x"))

@@ -18,6 +18,7 @@ from blysk.bench.quality.paper import (
     methods_of,
     paper,
     reference_texts,
+    rivals_of,
 )
 
 
@@ -37,7 +38,18 @@ def report():
     points = [point("renormalise", "blinn", 0.53, 1.2), point("quotient", "blinn", 0.52, 1.0)]
     points += [point("linear", "cosquad", 90.0, 1.3), point("quotient", "blinn", 0.6, 1.0, exponent=10)]
     versions = {"blysk": "0.1.0", "Python": "3.11", "amaranth": "0.5", "numpy": "2"}
-    figures = {"points": {"figures": {"points": points}}}
+    parts = [
+        {"method": name, "lights": lights, "multipliers": 9 * lights, "adders, bits": 700}
+        for name in ("duff", "renormalise")
+        for lights in (1, 8)
+    ]
+    errors = [
+        {"method": name, "mesh": "ring", "exponent": exponent, "largest error before rounding, LSB": 0.25}
+        for name in ("duff", "renormalise")
+        for exponent in (10, 100)
+    ]
+    tables = {"rivals-parts": {"rows": parts}, "rivals-errors": {"rows": errors}}
+    figures = {"points": {"figures": {"points": points}}, "rivals": {"tables": tables}}
     return {"made": "2026-11-27T10:00:00+00:00", "versions": versions, "sections": figures}
 
 
@@ -76,6 +88,12 @@ def test_table_of_methods():
         methods_of([point("linear", "cosquad", 90.0, 1.3)])
 
 
+def test_table_of_rivals():
+    found = rivals_of(report()["sections"]["rivals"]["tables"])
+    assert (found["meshes"], found["most"]) == (["ring"], 8)
+    assert found["rows"][0] == {"method": "duff", "multipliers": [9, 72], "adders": 700, "errors": [0.25]}
+
+
 def test_all_sources_of_the_paper_are_there():
     """Each citation has its entry, and each reference of the list is cited."""
     data = data_of(report())
@@ -105,7 +123,7 @@ def test_the_paper_has_at_most_eight_pages(tmp_path):
 @pytest.mark.parametrize(
     ("content", "line"),
     [
-        (None, "is not such a report; give the report.json of `blysk bench --only points`"),
+        (None, "is not such a report; give the report.json of `blysk bench --only points --only rivals`"),
         ("{}", "is not such a report"),
         (json.dumps({"sections": {"points": {"figures": {"points": []}}}}), "are not in the report"),
     ],
