@@ -359,17 +359,14 @@ def cut_by_error(
 
     - its angle is over the method's `Interpolator.widest_span`;
     - ``chord-local`` would flag it: a word of `ChordSetup` would overflow;
-    - it has pixels between the places whose values the method's curve has, and vectors turn farther than
-      `LocalChordInterpolator` allows;
-    - it has pixels between these places, and the error of N·L or u is over its tolerance;
-    - where its highlight shows, N·L of a light changes its sign or comes near 0, so N·L of a pixel might have
-      the wrong sign. Exact values within 2^-25 of 0 are left out;
-    - the errors of a light that fades, with N·L times its factor, are over the budgets of
-      `LocalChordInterpolator` at any pixel. Here every pixel is checked.
+    - an error of ``chord-local`` is over a budget at any of its pixels, see `LocalChordInterpolator`. Spans
+      of one or two pixels are not checked;
+    - another method has pixels between the places whose values its curve has, and at the places that it
+      checks vectors turn too far, or the error of N·L or u is over its tolerance, see `HighlightLimits`. The
+      tolerance of u depends on the exponent of the span's material, and on the least u of the span.
 
-    The tolerance of u depends on the exponent of the span's material. It also depends on the least u of the
-    span, because dark spans may have larger errors than bright spans. If a light is behind the surface along
-    the whole span, only the angle of the span counts. A light that is off has no effect.
+    If a light is behind the surface along the whole span, only the angle of the span counts. A light that is
+    off has no effect.
 
     Parameters
     ----------

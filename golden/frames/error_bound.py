@@ -6,43 +6,48 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import ArrayLike
 
+from blysk.golden.cosines.chord_setup import ChordSetup
 from blysk.golden.frames.albedo_bound import AttributeErrors, albedo_bound
 from blysk.golden.frames.highlight_limits import HighlightLimits
 from blysk.golden.frames.quotient_bound import (
     LightErrors,
+    bound_of,
     light_errors,
     quotient_bound,
     quotient_triangle_bound,
     triangle_light_errors,
 )
 from blysk.golden.geometry.scene_triangles import SceneTriangles
+from blysk.golden.lighting.lobe import Lobe
 from blysk.golden.lighting.transfer import Transfer
+from blysk.golden.methods.local_chord_interpolator import LocalChordInterpolator
 from blysk.golden.pipeline import ShadingPipeline
 from blysk.golden.reference.lighting import distant_cosine
-from blysk.golden.reference.lobes import LEAST_ROUGHNESS, TABLE_MODELS
+from blysk.golden.reference.lobes import LEAST_ROUGHNESS, TABLE_MODELS, curve_lines
 from blysk.golden.reference.raster import Raster
 from blysk.golden.reference.scene import Scene
 from blysk.golden.reference.transfer import slope
 from blysk.golden.render import Renderer
 
-__all__ = ["encoded_bound", "error_bound", "pixel_bound", "triangle_bound"]
+__all__ = ["budget_errors", "encoded_bound", "error_bound", "pixel_bound", "triangle_bound"]
 
 
 def error_bound(scene: Scene, design: ShadingPipeline, cut: Raster | None = None) -> float | None:
     """Bound of the error against exact normals of every pixel with the same model, in LSB of linear light.
 
-    For each material that is not unlit, multiply each light's colour by the sum of diffuse and specular
-    reflection, and add these products of all lights. Let c be the largest channel of these sums; 1 is the
-    full channel. Then::
+    Three methods have a bound, each of its own kind.
+
+    - ``quotient``: from the vectors of its spans, see `quotient_bound`.
+    - ``chord-local``: from the budgets that every pixel keeps, see `budget_errors`. It is proved, except for
+      the error of the lobe's table, which is measured.
+    - ``renormalise``: tested by search, and not proved. For each material that is not unlit, multiply each
+      light's colour by the sum of diffuse and specular reflection, and add these products of all lights. Let
+      c be the largest channel of these sums; 1 is the full channel. Then::
 
         arithmetic error <= 1/2 + c/16        method error <= 1/2 + c/16 + c/4        (LSB)
 
-    The half is the rounding of the pixel. The quarter is the tolerance of cut spans. For codes of sRGB
-    ``chord-local`` divides it by a slope of the transfer, see `HighlightLimits`. The tolerance is checked at
-    some places of a span; a proof for all places is missing (docs/theory/chord.md#where-spans-are-cut). A
-    search found light of ``chord-local`` that exceeds it by 0.021 LSB before rounding
-    (docs/guide/accuracy.md#the-adversary). The sixteenth holds the rounding of operands and terms. It is at
-    least 1/128, for the ambient operand.
+      The half is the rounding of the pixel. The sixteenth holds the rounding of operands and terms. It is at
+      least 1/128, for the ambient operand.
 
     The bound holds for spans from software, and off the border of every light, see `border_mask`.
 
@@ -161,6 +166,10 @@ class _Bounds:
     def by_tolerance(self) -> float | None:
         return _tolerance_bound(self.scene, self.design)
 
+    def by_budget(self) -> float | None:
+        errors = budget_errors(self.scene, self.design)
+        return None if errors is None else bound_of(self.scene, errors)
+
 
 @dataclass(frozen=True)
 class _PixelBounds:
@@ -177,9 +186,12 @@ class _PixelBounds:
         brightness = _brightness(self.scene, self.design)
         if brightness is None:
             return None
-        share = (1 / 16 + _tolerance(self.scene, self.design)) / 255
         # The tolerance holds for the whole light, diffuse and specular together.
-        return self._by([LightErrors(np.zeros(3), share * of) for of in brightness])
+        return self._by([LightErrors(np.zeros(3), 5 / 16 / 255 * of) for of in brightness])
+
+    def by_budget(self) -> np.ndarray | None:
+        errors = budget_errors(self.scene, self.design)
+        return None if errors is None else self._by(errors)
 
     def _by(self, errors: Sequence[LightErrors]) -> np.ndarray | None:
         albedo = self.design.albedo
@@ -200,6 +212,9 @@ class _TriangleBounds:
         return quotient_triangle_bound(self.scene, self.renderer, self.sent)
 
     def by_tolerance(self) -> float | None:
+        return None
+
+    def by_budget(self) -> float | None:
         return None
 
 
@@ -224,6 +239,9 @@ class _TrianglePixelBounds:
     def by_tolerance(self) -> None:
         return None
 
+    def by_budget(self) -> None:
+        return None
+
 
 def _tolerance_bound(scene: Scene, design: ShadingPipeline) -> float | None:
     """Bound from the tolerances of cut spans, as `error_bound` states it."""
@@ -231,14 +249,63 @@ def _tolerance_bound(scene: Scene, design: ShadingPipeline) -> float | None:
     if brightness is None:
         return None
     largest = float(np.max(brightness))
-    return 0.5 + max(largest / 16, 1 / 128) + largest * _tolerance(scene, design)
+    return 0.5 + max(largest / 16, 1 / 128) + largest / 4
 
 
-def _tolerance(scene: Scene, design: ShadingPipeline) -> float:
-    """Tolerance of cut spans, in LSB of linear light for lights of 1."""
-    # Spans of an exact curve are not cut for its error.
-    steepest = 1.0 if design.interpolator.curve_is_exact else HighlightLimits.of(scene, design).slope
-    return 1 / 4 / steepest
+def budget_errors(scene: Scene, design: ShadingPipeline) -> list[LightErrors] | None:
+    """Bounds of the light on each material by ``chord-local``, without the rounding of colour operands.
+
+    Spans are cut so that every pixel keeps the budgets of `LocalChordInterpolator`, divided by the slope of
+    the transfer (`HighlightLimits`). To the budgets a term adds
+
+    - the rounding of the diffuse term, 2^-18;
+    - the error of the specular unit against its model (`HighlightOperand.error`), and the error of the lines
+      of its table, which is measured;
+    - the product with the factor of a light that fades, ``3 2^-18``;
+    - with a scale of u, the part of a lobe that is left out, a quarter of the table's step.
+
+    Spans of one or two pixels are not checked. The word of u is off by half a step and a cut there, and by
+    the relative error 2^-16 of the unit of the words. If the slope of the lobe times this error is over the
+    budget, it takes the place of the budget.
+
+    Parameters
+    ----------
+    scene, design
+        As for `error_bound`.
+
+    Returns
+    -------
+    list of LightErrors, or None
+        ``None``: no bound is known, as in `error_bound`.
+
+    Source: docs/theory/chord.md#bound-of-a-frame.
+    """
+    unit = design.specular
+    if unit is None or _brightness(scene, design) is None:
+        return None
+    method, limits = design.interpolator, HighlightLimits.of(scene, design)
+    step = ChordSetup.HIGHLIGHT_FORMAT.step / 2 + LocalChordInterpolator.COSINE_FORMAT.step
+    left_out = Lobe.VALUE_FORMAT.step / 4 if method.scale else 0
+    found = []
+    for material in scene.materials:
+        parameter = design.highlight_parameter(material)
+        u, _, slopes = curve_lines(unit.reflection, parameter)
+        # A slope belongs to the interval up to the next argument.
+        words = float((slopes * (np.ldexp(step, -method.scale) + np.append(u[1:], 1) * 2.0**-16)).max())
+        span = max(LocalChordInterpolator.HIGHLIGHT_BUDGET / 255 / limits.slope, words)
+        unit_error = unit.error + unit.line_error(parameter) + left_out
+        diffuse = LocalChordInterpolator.DIFFUSE_BUDGET / 255 / limits.slope
+        sums = LightErrors(*np.zeros((2, 3)))
+        for light in () if material.unlit else scene.lights:
+            reflection = material.reflection(distant_cosine(light, scene.distant_viewer))
+            color = np.array(light.color)
+            # The budgets of a light that fades hold for its own brightness.
+            inner = color / max(1.0, *light.color) if light.fades else color
+            product = 3 * 2.0**-18 * light.fades
+            sums.diffuse[:] += np.multiply(material.diffuse, diffuse * inner + 2.0**-18 * color)
+            sums.highlight[:] += np.multiply(reflection, span * inner + (unit_error + product) * color)
+        found.append(sums)
+    return found
 
 
 def _brightness(scene: Scene, design: ShadingPipeline) -> list[np.ndarray] | None:

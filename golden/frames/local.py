@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from blysk.golden.cosines.chord_setup import SpanValues
-from blysk.golden.methods.local_chord_interpolator import LocalChordInterpolator
+from blysk.golden.frames.highlight_limits import HighlightLimits
 from blysk.golden.reference.geometry import any_component, normalise, sum_of_components
 from blysk.golden.reference.lighting import halfway_vector
 from blysk.golden.reference.raster import Raster
@@ -112,16 +112,16 @@ class SurfacePoints:
         highlight = np.where(any_component(halfway).T, highlight, 2.0)
         return replace(self, normal=normal, diffuse=diffuse, highlight=highlight)
 
-    def turned(self, other: "SurfacePoints", method: LocalChordInterpolator) -> np.ndarray:
-        """Whether N, V or an L differs from ``other`` by more than the method allows; (count,)."""
-        least = np.cos(np.radians(method.MAX_VECTOR_ANGLE))
+    def turned(self, other: "SurfacePoints", limits: HighlightLimits) -> np.ndarray:
+        """Whether N, V or an L differs from ``other`` by more than the limits allow; (count,)."""
+        least = np.cos(np.radians(limits.MAX_VECTOR_ANGLE))
         result = np.einsum("sk,sk->s", self.normal, other.normal) < least
         result |= np.einsum("sk,sk->s", self.viewer, other.viewer) < least
         result |= (np.einsum("lsk,lsk->ls", self.direction, other.direction) < least).any(axis=0)
         move = np.linalg.norm(self.viewer - other.viewer, axis=1)
         move = move + np.linalg.norm(self.direction - other.direction, axis=2)
         total = [np.linalg.norm(place.direction + place.viewer, axis=2) for place in (self, other)]
-        found: np.ndarray = result | (move > method.MAX_HALFWAY_CHANGE * np.minimum(*total)).any(axis=0)
+        found: np.ndarray = result | (move > limits.MAX_HALFWAY_CHANGE * np.minimum(*total)).any(axis=0)
         return found
 
 

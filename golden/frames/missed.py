@@ -74,12 +74,12 @@ def _missed(
 
 
 def missed_pieces(scene: Scene, renderer: Renderer, sent: SceneTriangles) -> dict[str, int]:
-    """Numbers of pieces whose errors are over the tolerances of `LocalChordInterpolator`, by cause.
+    """Numbers of pieces whose errors are over the tolerances of `HighlightLimits`, by cause.
 
     Geometry cuts a span by an angle. The angle bounds the error of a method's curve only if N/W has the same
     length at both ends of a piece. So N·L and u of the curve are compared with their values on the piece's
     own line, at its quarters. `cut_by_error` does the same before it cuts. The quarters give the error in
-    between up to a factor, which was found by search, see `LocalChordInterpolator`.
+    between up to a factor, which was found by search, see `HighlightLimits`.
 
     The words of N/W are off by up to `GradientSetup.error` of the longest normal of the triangle. Divided by
     m, this error is the angle by which a normal of length m turns. If the angle alone is over a tolerance,

@@ -1,7 +1,7 @@
 """Pieces of spans, and the distance of a method's curve from the exact values along a piece."""
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -42,7 +42,10 @@ class Pieces:
 
     def miss(self, interpolator: Interpolator, limits: HighlightLimits, material: np.ndarray) -> np.ndarray:
         """Whether the curve of a method is too far from the exact curve; bool, shape (pieces,)."""
-        return self._scaled(interpolator)._miss(interpolator, limits, material)
+        setup = interpolator.value_setup
+        if setup is None:
+            return self._miss(interpolator, limits, material)
+        return self._miss_of_values(setup, interpolator.scale, limits, material)
 
     def off(
         self, interpolator: Interpolator, limits: HighlightLimits, material: np.ndarray, turn: np.ndarray
@@ -63,7 +66,7 @@ class Pieces:
 
         def too_far(off: Mapping[str, np.ndarray], inner: np.ndarray) -> np.ndarray:
             least = np.maximum(curves["highlight"].least - inner, 0)
-            wrong = off["diffuse"] > LocalChordInterpolator().diffuse_tolerance / limits.slope
+            wrong = off["diffuse"] > limits.DIFFUSE_TOLERANCE / limits.slope
             wrong = wrong | (off["highlight"] > limits.tolerance(material, least))
             found: np.ndarray = wrong & (curves["diffuse"].largest + off["diffuse"] >= 0)
             return found
@@ -72,105 +75,56 @@ class Pieces:
         if interpolator.curve_is_exact:
             return np.zeros(len(turn), dtype=bool), np.logical_or.reduce(by_words, axis=1)
         both = {name: curve[name] + words[name] for name in curves}
-        inner = margin / LocalChordInterpolator.MARGIN * misses["highlight"] + words["highlight"]
+        inner = margin / HighlightLimits.MARGIN * misses["highlight"] + words["highlight"]
         by_curve = too_far(both, inner).any(axis=1)
-        by_curve |= self.places[0].turned(self.places[-1], LocalChordInterpolator())
+        by_curve |= self.places[0].turned(self.places[-1], limits)
         return by_curve & (self.last - self.first >= 2), np.logical_or.reduce(by_words, axis=1)
 
-    def _scaled(self, interpolator: Interpolator) -> "Pieces":
-        """The pieces with u of their places in the scale of the method's words."""
-        scale = interpolator.scale
-        return replace(self, places=tuple(place.scaled(scale) for place in self.places)) if scale else self
-
     def _miss(self, interpolator: Interpolator, limits: HighlightLimits, material: np.ndarray) -> np.ndarray:
-        """Result of `miss`; u of the places has the scale of the method's words."""
-        pixels = (self.last - self.first + 1)[:, np.newaxis]
-        setup = interpolator.value_setup
-        # Whether the span has pixels between the three (or two) places whose values its curve has.
-        between = pixels > (3 if setup else 2)
-        fading = np.array([light.fades for light in self.scene.lights], dtype=bool)
-        names = ("diffuse", "highlight", "factor") if fading.any() else ("diffuse", "highlight")
-        curves = {name: _Quadratic.of(self.places, name) for name in names}
-        diffuse, highlight = curves["diffuse"], curves["highlight"]
-        if setup:
-            wrong = self._flagged(setup, curves)
-            misses = {name: curve.miss(self.places, name) for name, curve in curves.items()}
-        else:
-            wrong = np.zeros(len(self.origin), dtype=bool)
-            misses = self._misses_of_normals(interpolator)
-        wrong |= between[:, 0] & self.places[0].turned(self.places[-1], LocalChordInterpolator())
-        margin = self._margin()[:, np.newaxis]
+        """Result of `miss` for a method of normals."""
+        between = self.last - self.first >= 2
+        curves = {name: _Quadratic.of(self.places, name) for name in ("diffuse", "highlight")}
+        wrong = between & self.places[0].turned(self.places[-1], limits)
+        misses, margin = self._misses_of_normals(interpolator), self._margin()[:, np.newaxis]
         errors = {name: margin * miss for name, miss in misses.items()}
-        if setup:
-            errors["diffuse"] += setup.diffuse_error(*diffuse.sizes)
-            errors["highlight"] += setup.highlight_error(*highlight.sizes)
-        in_front = diffuse.largest + errors["diffuse"] >= 0
-        least = np.maximum(highlight.least - margin / LocalChordInterpolator.MARGIN * misses["highlight"], 0)
-        too_far = errors["diffuse"] > LocalChordInterpolator().diffuse_tolerance / limits.slope
-        tolerance, lit = limits.tolerance(material, least), limits.is_lit(material, least)
-        # If a light fades, every pixel is checked below.
-        too_far |= (errors["highlight"] > tolerance) & ~fading
-        wrong |= (too_far & in_front & between).any(axis=1)
-        if fading.any():
-            chosen = np.flatnonzero(between[:, 0] & ~wrong)
-            shares = errors["highlight"][chosen] / tolerance[chosen], lit[chosen]
-            wrong[chosen] = (self._fades_wrong(chosen, curves, *shares, limits.slope) & fading).any(axis=1)
-        turns_dark = in_front & (diffuse.least - errors["diffuse"] <= 0) & lit
-        chosen = np.flatnonzero(turns_dark.any(axis=1) & ~wrong)
-        if setup:
-            kept = self.origin, self.first, self.last, turns_dark
-            curve = diffuse.left, diffuse.slope, diffuse.curvature
-            given = (field[chosen] for field in (*kept, *curve))
-            wrong[chosen] = _mistakes_sign(self.scene, self.raster, limits.slope, *given)
-        return wrong
-
-    def _fades_wrong(
-        self,
-        chosen: np.ndarray,
-        curves: "Mapping[str, _Quadratic]",
-        highlight_share: np.ndarray,
-        lit: np.ndarray,
-        slope: float,
-    ) -> np.ndarray:
-        """Whether a light's factor, or the factor times N·L, is too far off at any pixel of a piece.
-
-        Parameters
-        ----------
-        chosen : int array
-            Pieces.
-        curves : dict of _Quadratic
-            Curves ``diffuse`` and ``factor`` of all pieces.
-        highlight_share : float64 array, shape (chosen, lights)
-            Error of u as a share of its tolerance.
-        lit : bool array, shape (chosen, lights)
-            Whether a light may have a highlight.
-        slope : float
-            `HighlightLimits.slope`.
-
-        Returns
-        -------
-        bool array, shape (chosen, lights)
-        """
-        method = LocalChordInterpolator()
-        names = ("diffuse", "factor")
-        curves = {name: curves[name].part(chosen) for name in names}
-        origin, first, last = (field[chosen] for field in (self.origin, self.first, self.last))
-        misses, largest = _misses_of_pixels(self.scene, self.raster, origin, first, last, curves)
-        words = {name: method.setup.diffuse_error(*curve.sizes) for name, curve in curves.items()}
-        # A light that fades may be brighter than white where it is near.
-        bright = np.array([max(1.0, *light.color) for light in self.scene.lights])
-        factor = np.where(lit, 255 * slope * bright * (misses["factor"] + words["factor"]), 0)
-        total = factor + method.HIGHLIGHT_BUDGET * highlight_share * largest * bright
-        wrong = slope * bright * (misses["diffuse"] + words["diffuse"]) > method.diffuse_tolerance
-        found: np.ndarray = wrong | ((factor > method.FACTOR_BUDGET) | (total > method.HIGHLIGHT_BUDGET)) & (
-            largest > 0
-        )
+        in_front = curves["diffuse"].largest + errors["diffuse"] >= 0
+        nearer = margin / HighlightLimits.MARGIN * misses["highlight"]
+        least = np.maximum(curves["highlight"].least - nearer, 0)
+        too_far = errors["diffuse"] > limits.DIFFUSE_TOLERANCE / limits.slope
+        too_far |= errors["highlight"] > limits.tolerance(material, least)
+        found: np.ndarray = wrong | ((too_far & in_front).any(axis=1) & between)
         return found
+
+    def _miss_of_values(
+        self, setup: ChordSetup, scale: int, limits: HighlightLimits, material: np.ndarray
+    ) -> np.ndarray:
+        """Result of `miss` for a method of values, by every pixel of the pieces.
+
+        The places at t = 1/4 and 3/4 find most of the pieces that are off. The other pieces are checked pixel
+        by pixel.
+        """
+        places = tuple(place.scaled(scale) for place in self.places)
+        fading = any(light.fades for light in self.scene.lights)
+        names = ("diffuse", "highlight", "factor") if fading else ("diffuse", "highlight")
+        curves = {name: _Quadratic.of(places, name) for name in names}
+        wrong = self._flagged(setup, curves)
+        judge = _Judge.of(self.scene, setup, curves, limits, material, scale)
+        every, long = np.arange(len(wrong)), self.last - self.first >= 4
+        for k, t in ((1, 0.25), (3, 0.75)):
+            wrong |= long & judge.rejects(every, places[k], np.full(len(wrong), t))
+        left = np.flatnonzero(~wrong)
+        pixels = _pixels_of(
+            self.scene, self.raster, *(of[left] for of in (self.origin, self.first, self.last))
+        )
+        for of_pixel, exact, t in pixels:
+            off = judge.rejects(left[of_pixel], exact.scaled(scale), t)
+            wrong[left[of_pixel[off]]] = True
+        return wrong
 
     def _margin(self) -> np.ndarray:
         """Bound of the largest error on each piece, as a multiple of the error at its quarters.
 
-        This is the largest of three numbers: `LocalChordInterpolator.MARGIN`, the ratio of the interpolated
+        This is the largest of three numbers: `HighlightLimits.MARGIN`, the ratio of the interpolated
         normals' lengths at the two ends, and the ratio of the weights there. If a ratio is large, nearly all
         change is near one end.
         """
@@ -180,7 +134,7 @@ class Pieces:
             ends.append([np.linalg.norm(lines_along(*at), axis=1), weights_along(*at).sum(axis=1)])
         smaller, larger = np.sort(ends, axis=0)
         ratio = np.divide(larger, smaller, out=np.full_like(larger, 1e9), where=smaller > 0).max(axis=0)
-        found: np.ndarray = np.maximum(ratio, LocalChordInterpolator.MARGIN)
+        found: np.ndarray = np.maximum(ratio, HighlightLimits.MARGIN)
         return found
 
     def _flagged(self, setup: ChordSetup, curves: "Mapping[str, _Quadratic]") -> np.ndarray:
@@ -236,11 +190,6 @@ class _Quadratic:
         three = left, right, vertex
         return cls(left, slope, curvature, np.minimum.reduce(three), np.maximum.reduce(three))
 
-    def part(self, chosen: np.ndarray) -> "_Quadratic":
-        """The quadratics of some pieces."""
-        kept = self.left, self.slope, self.curvature, self.least, self.largest
-        return _Quadratic(*(field[chosen] for field in kept))
-
     def at(self, piece: np.ndarray, t: np.ndarray) -> np.ndarray:
         """Values at t of pieces, shape (count, lights)."""
         t = t[:, np.newaxis]
@@ -252,15 +201,78 @@ class _Quadratic:
         """Absolute values of the slope and curvature terms P and G."""
         return np.abs(self.slope), np.abs(self.curvature)
 
-    def miss(self, places: Sequence[SurfacePoints], name: str) -> np.ndarray:
-        """Largest distance from the exact values at t = 1/4 and 3/4."""
-        found: np.ndarray = np.maximum.reduce(
-            [
-                np.abs(self.left + t * (self.slope + t * self.curvature) - getattr(places[k], name))
-                for k, t in ((1, 0.25), (3, 0.75))
-            ]
-        )
+
+@dataclass(frozen=True)
+class _Judge:
+    """Tells at which places of pieces the light of ``chord-local`` may be off by more than its budgets.
+
+    ``words`` bounds the errors of the words of each quadratic, shape (pieces, lights). ``brightness`` of a
+    light multiplies its errors.
+    """
+
+    curves: Mapping[str, "_Quadratic"]
+    words: Mapping[str, np.ndarray]
+    limits: HighlightLimits
+    material: np.ndarray
+    fading: np.ndarray
+    brightness: np.ndarray
+    scale: int
+
+    @classmethod
+    def of(
+        cls,
+        scene: Scene,
+        setup: ChordSetup,
+        curves: Mapping[str, "_Quadratic"],
+        limits: HighlightLimits,
+        material: np.ndarray,
+        scale: int,
+    ) -> "_Judge":
+        """Judge of the pieces with these curves and materials, and this scale of u."""
+        words = {name: setup.diffuse_error(*curve.sizes) for name, curve in curves.items()}
+        words["highlight"] = setup.highlight_error(*curves["highlight"].sizes)
+        # A result is cut to the words of a pixel.
+        words = {name: error + LocalChordInterpolator.COSINE_FORMAT.step for name, error in words.items()}
+        fading = np.array([light.fades for light in scene.lights], dtype=bool)
+        # A light that fades may be brighter than white where it is near.
+        bright = [max(1.0, *light.color) if light.fades else 1.0 for light in scene.lights]
+        return cls(curves, words, limits, material, fading, np.array(bright), scale)
+
+    def rejects(self, piece: np.ndarray, exact: SurfacePoints, t: np.ndarray) -> np.ndarray:
+        """Whether a light at t of pieces may be off by more than a budget; bool, shape (count,)."""
+        method, share = LocalChordInterpolator, 1 / (255 * self.limits.slope * self.brightness)
+        fit, words = self._fit("diffuse", piece, t), self.words["diffuse"][piece]
+        off = np.abs(np.maximum(fit, 0) - np.maximum(exact.diffuse, 0)) + words
+        found: np.ndarray = (off > method.DIFFUSE_BUDGET * share).any(axis=1)
+        found |= (self._specular(piece, exact, t, fit, words) > method.HIGHLIGHT_BUDGET * share).any(axis=1)
         return found
+
+    def _fit(self, name: str, piece: np.ndarray, t: np.ndarray) -> np.ndarray:
+        """Values of a quadratic in the unit of the words."""
+        found: np.ndarray = float(ONE_SQUARED.values) * self.curves[name].at(piece, t)
+        return found
+
+    def _specular(
+        self, piece: np.ndarray, exact: SurfacePoints, t: np.ndarray, cosine: np.ndarray, error: np.ndarray
+    ) -> np.ndarray:
+        """Largest errors of the specular terms, shape (count, lights); ``cosine`` is the fit of N·L."""
+        material = self.material[piece]
+        fit, words = self._fit("highlight", piece, t), self.words["highlight"][piece]
+        term, near, far = (
+            self.limits.reflect(material, np.ldexp(u, -self.scale))
+            for u in (exact.highlight, fit - words, fit + words)
+        )
+        off = np.maximum(np.abs(near - term), np.abs(far - term))
+        # Nearer to 0 than a step, words do not tell the sign of N·L.
+        sure = np.abs(exact.diffuse) > ChordSetup.DIFFUSE_FORMAT.step
+        off = np.where(sure & (cosine <= error), np.maximum(off, term), off)
+        behind = np.where(sure & (cosine > -error), near, 0)
+        off = np.where(exact.diffuse > 0, off, behind)
+        if not self.fading.any():
+            return off
+        way = np.abs(self._fit("factor", piece, t) - exact.factor) + self.words["factor"][piece]
+        largest = np.where((exact.diffuse > 0) | (behind > 0), np.maximum(term, np.maximum(near, far)), 0)
+        return exact.factor * off + np.where(self.fading, way * largest, 0)
 
 
 def _pixels_of(
@@ -273,65 +285,3 @@ def _pixels_of(
         place = (first[of_pixel] + step) / (raster.length[origin[of_pixel]] - 1)
         exact = SurfacePoints.at(scene, raster, origin[of_pixel], place)
         yield of_pixel, exact, step / (last - first)[of_pixel]
-
-
-def _misses_of_pixels(
-    scene: Scene,
-    raster: Raster,
-    origin: np.ndarray,
-    first: np.ndarray,
-    last: np.ndarray,
-    curves: Mapping[str, _Quadratic],
-) -> tuple[dict[str, np.ndarray], np.ndarray]:
-    """Largest distance of curves from the exact values at the pixels of pieces.
-
-    Returns
-    -------
-    misses : dict of float64 array, shape (pieces, lights)
-        Errors of ``diffuse``, where values under 0 count as 0. Errors of ``factor`` at pixels where the light
-        is not behind the surface.
-    largest : float64 array, shape (pieces, lights)
-        Largest factor at these pixels; 0 without these pixels.
-    """
-    shape = len(origin), len(scene.lights)
-    misses, largest = {name: np.zeros(shape) for name in curves}, np.zeros(shape)
-    for of_pixel, exact, t in _pixels_of(scene, raster, origin, first, last):
-        starts = np.flatnonzero(np.r_[True, of_pixel[1:] != of_pixel[:-1]])
-        pieces = of_pixel[starts]
-        fit = {name: curve.at(of_pixel, t) for name, curve in curves.items()}
-        reached = exact.diffuse > -ChordSetup.DIFFUSE_FORMAT.step
-        for values, of_all in (
-            (np.abs(np.maximum(fit["diffuse"], 0) - np.maximum(exact.diffuse, 0)), misses["diffuse"]),
-            (np.where(reached, np.abs(fit["factor"] - exact.factor), 0), misses["factor"]),
-            (np.where(reached, exact.factor, 0), largest),
-        ):
-            of_all[pieces] = np.maximum.reduceat(values, starts)
-    return misses, largest
-
-
-def _mistakes_sign(
-    scene: Scene,
-    raster: Raster,
-    transfer_slope: float,
-    origin: np.ndarray,
-    first: np.ndarray,
-    last: np.ndarray,
-    lights: np.ndarray,
-    left: np.ndarray,
-    slope: np.ndarray,
-    curvature: np.ndarray,
-) -> np.ndarray:
-    """Whether N·L of a pixel of a span might have the wrong sign, for the lights in ``lights``."""
-    result = np.zeros(len(origin), dtype=bool)
-    bound = ChordSetup().diffuse_error(np.abs(slope), np.abs(curvature))
-    for of_pixel, exact, t in _pixels_of(scene, raster, origin, first, last):
-        t = t[:, np.newaxis]
-        fit = left[of_pixel] + t * (slope[of_pixel] + t * curvature[of_pixel])
-        wrong = np.where(exact.diffuse > 0, fit <= bound[of_pixel], fit > -bound[of_pixel])
-        # Nearer to 0, words do not tell the sign. A pixel that a fading light hardly reaches may be lit or
-        # not.
-        wrong &= np.abs(exact.diffuse) > ChordSetup.DIFFUSE_FORMAT.step
-        least = LocalChordInterpolator.FACTOR_BUDGET / (255 * transfer_slope)
-        wrong &= (exact.factor > least) & lights[of_pixel]
-        result |= np.bincount(of_pixel, wrong.any(axis=1), len(origin)) > 0
-    return result

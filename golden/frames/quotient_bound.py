@@ -24,6 +24,7 @@ from blysk.golden.render import Renderer
 __all__ = [
     "LightErrors",
     "across_slivers",
+    "bound_of",
     "light_errors",
     "quotient_bound",
     "quotient_triangle_bound",
@@ -64,7 +65,7 @@ def quotient_bound(scene: Scene, design: ShadingPipeline, cut: Raster) -> float:
     """
     if not len(cut.length):
         return 0.5
-    return _bound(scene, light_errors(scene, design, cut))
+    return bound_of(scene, light_errors(scene, design, cut))
 
 
 def light_errors(scene: Scene, design: ShadingPipeline, cut: Raster) -> list[LightErrors]:
@@ -96,7 +97,7 @@ def quotient_triangle_bound(scene: Scene, renderer: Renderer, sent: SceneTriangl
         The bound; ``None`` as of `triangle_light_errors`.
     """
     errors = triangle_light_errors(scene, renderer, sent)
-    return None if errors is None else _bound(scene, errors)
+    return None if errors is None else bound_of(scene, errors)
 
 
 def triangle_light_errors(scene: Scene, renderer: Renderer, sent: SceneTriangles) -> list[LightErrors] | None:
@@ -177,8 +178,18 @@ def across_slivers(drawn: SortedTriangles, codes: np.ndarray, renderer: Renderer
     return np.where(sliver, np.abs(across).max(axis=1), 0)
 
 
-def _bound(scene: Scene, errors: list[LightErrors]) -> float:
-    """Bound of a pixel, from the bounds of the light on each material."""
+def bound_of(scene: Scene, errors: list[LightErrors]) -> float:
+    """Bound of a pixel in LSB, from the bounds of the light on each material.
+
+    The rounding of the pixel adds 1/2, and each of its colour operands 1/128.
+
+    Parameters
+    ----------
+    scene : Scene
+        The scene.
+    errors : list of LightErrors
+        Bounds of the light on each material.
+    """
     largest = max(float((of.diffuse + of.highlight).max()) for of in errors)
     return 0.5 + 255 * largest + (1 + 2 * len(scene.lights)) / 128
 

@@ -79,5 +79,8 @@ class ErrorBounds(Protocol[Bound]):
     def by_tolerance(self) -> Bound | None:
         """Bound from the tolerances of cut spans, see `error_bound`."""
 
+    def by_budget(self) -> Bound | None:
+        """Bound from the budgets that every pixel of cut spans keeps, see `error_bound`."""
+
     def by_vectors(self) -> Bound | None:
         """Bound from the vectors of the spans, see `quotient_bound`."""

@@ -1,6 +1,5 @@
 """The chord method for point lights and a near viewer: three values of N·L and of the chord a span."""
 
-import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
@@ -42,34 +41,25 @@ class LocalChordInterpolator(Interpolator):
     The quadratic is good only for short spans. Cut spans until
 
     - the normals at their ends are at most 30 degrees apart;
-    - N, V and each light's L change by at most `MAX_VECTOR_ANGLE` degrees from end to end;
-      - ``|dV| + |dL|`` is at most `MAX_HALFWAY_CHANGE` of ``|L + V|``, because H changes fast where L is
-        nearly -V;
-    - the errors of the quadratics at t = 1/4 and 3/4 are within `highlight_tolerance` and `diffuse_tolerance`
-      minus the bounds of the arithmetic. `MARGIN` multiplies the errors, for the positions between. If the
-      ratio of the normals' lengths at the two ends is larger, this ratio takes the place of `MARGIN`. These
-      factors were found by search. With equal lengths the largest error at any t was 1.31 times the error at
-      1/4 and 3/4. With lengths in the ratio g it was up to ``1.03 max(4/3, g)`` times.
+    - at every pixel of a span of three pixels or more, and for every light, the errors are within the
+      budgets.
 
-    Fit and arithmetic together have a budget of error, at full reflection: 0.4 LSB in the specular term and
-    0.12 in the diffuse term. The reference is exactly normalised interpolation. The budget is checked at
-    these places; a proof for every pixel is missing. `blysk.golden.frames.error_bound` has the bound
-    of a frame.
+    Each error is of the quadratic and its words together, at full reflection:
 
-    Where N·L changes its sign the highlight ends at any brightness. A pixel whose N·L is within the error of
-    0 may have the highlight or not. If `is_lit`, cut a span with these pixels further.
+    - the error of N·L is within `DIFFUSE_BUDGET`;
+    - the error of the specular term S is within `HIGHLIGHT_BUDGET`. S is computed at both ends of the
+      interval in which the word of u may be;
+    - where the word of N·L may have the wrong sign, the whole term S counts as error. Exact values within
+      2^-25 of 0 are left out.
+
+    The reference is exactly normalised interpolation. As every pixel is checked, no error exceeds its budget.
+    `blysk.golden.frames.error_bound` has the bound of a frame.
 
     A light that fades, by its distance or as a spot, has a factor a. Its values of N·L contain the factor,
     ``a N·L``. At each pixel the factor multiplies the specular term of its light (`Factor`). The factor is a
-    third quadratic of the light, in the formats of N·L. Spans are cut until three conditions hold at every
-    pixel that the light reaches:
-
-    - the error of ``a N·L`` is within `DIFFUSE_BUDGET`;
-    - where the highlight shows, the error of a is within `FACTOR_BUDGET`;
-    - the errors of a, and of u times the largest a of the span, are together within `HIGHLIGHT_BUDGET`.
-
-    A light that fades may be brighter than white. If the largest channel of its colour is over 1, this
-    channel multiplies all errors.
+    third quadratic of the light, in the formats of N·L. Its specular error is ``a |dS| + S |da|``. A light
+    that fades may be brighter than white. If the largest channel of its colour is over 1, this channel
+    multiplies all errors.
 
     ========== ========== ========================================
     word       format     why
@@ -101,12 +91,8 @@ class LocalChordInterpolator(Interpolator):
     operand: ClassVar = "one_minus_cosine"
     COSINE_FORMAT = SQ(2, 25)
     CURVE = "quadratic"
-    HIGHLIGHT_BUDGET: ClassVar[float] = 0.4
+    HIGHLIGHT_BUDGET: ClassVar[float] = 0.2
     DIFFUSE_BUDGET: ClassVar[float] = 0.12
-    FACTOR_BUDGET: ClassVar[float] = 0.25
-    MAX_VECTOR_ANGLE: ClassVar[float] = 30.0
-    MAX_HALFWAY_CHANGE: ClassVar[float] = 0.5
-    MARGIN: ClassVar[float] = 4 / 3
 
     def __post_init__(self) -> None:
         _ = self.setup
@@ -208,8 +194,8 @@ class LocalChordInterpolator(Interpolator):
         return shading.by_values(self.exact_operands)
 
     def bound(self, bounds: ErrorBounds[Bound]) -> Bound | None:
-        """Bound from the tolerances of cut spans."""
-        return bounds.by_tolerance()
+        """Bound from the budgets of every pixel."""
+        return bounds.by_budget()
 
     def check(self, spans: Spans, lights: int, factors: int) -> None:
         """Refuse spans without values or factors for every light, see `Interpolator.check`."""
@@ -332,49 +318,6 @@ class LocalChordInterpolator(Interpolator):
             results.append(left[span] + t * (slope[span] + t * square[span]))
         results[1] = np.ldexp(results[1], -self.scale)
         return tuple(results)
-
-    def highlight_tolerance(self, exponent: np.ndarray, u: np.ndarray) -> np.ndarray:
-        """Largest error of u that keeps `HIGHLIGHT_BUDGET`, for this u and every larger u.
-
-        The slope ``|dS/du|`` of a term is about n at the peak, and smaller away from the peak. It is
-        ``n (1 - n u/2)`` for the cosine-quadratic term, ``n (1 - u)^(n-1)`` for Blinn's power. With
-        ``x = (n - 1) u`` both are at most ``n / (1 + x/2 + x^2/4 + x^3/8)``. Slopes of the pipeline's other
-        models are at most 1.25 times this bound, and 1.6 times for n = 1.
-
-        Parameters
-        ----------
-        exponent : int array
-            n, 1 to 1000.
-        u : array
-            Least value of u, at least 0.
-        """
-        x = (np.asarray(exponent) - 1) * u / 2
-        found: np.ndarray = self.HIGHLIGHT_BUDGET / (255 * np.asarray(exponent)) * (1 + x * (1 + x * (1 + x)))
-        return found
-
-    @staticmethod
-    def is_lit(exponent: np.ndarray, u: np.ndarray, least: float = 1 / 1020) -> np.ndarray:
-        """Whether a highlight may be over a quarter of an LSB, for this u or any larger u.
-
-        Blinn's power is at most ``e^-x`` with ``x = (n - 1) u``. From ``x = 7`` on this is under a quarter of
-        an LSB. The other models reach 0 at a smaller x, or decrease as fast as Blinn's power.
-
-        Parameters
-        ----------
-        exponent : int array
-            n, 1 to 1000.
-        u : array
-            Least value of u, at least 0.
-        least : float
-            Least highlight that counts, by default a quarter of an LSB of linear light.
-        """
-        found: np.ndarray = (np.asarray(exponent) - 1) * u < 7 - math.log(1020 * least)
-        return found
-
-    @property
-    def diffuse_tolerance(self) -> float:
-        """Largest error of N·L that keeps `DIFFUSE_BUDGET`."""
-        return self.DIFFUSE_BUDGET / 255
 
 
 METHODS = {

@@ -93,8 +93,9 @@ class Adversary:
         self.method, self.model, self.count = method, model, count
         self.rng = np.random.default_rng([seed, *f"{method} {model}".encode()])
         self.rough = model in ("ggx", "beckmann")
-        # Sharper lobes have no bound of a frame.
-        self.range = (0.2, 1.0) if self.rough else (1.0, 1000.0)
+        # Sharper lobes have no bound of a frame, or a large bound.
+        roughest = 0.05 if method == "chord-local" else 0.2
+        self.range = (roughest, 1.0) if self.rough else (1.0, 1000.0)
         self.largest_pixel = 0.0
         """Largest error of a rounded pixel in the whole search, in LSB."""
         self.excess, self.worst = -np.inf, "no frame has a bound"

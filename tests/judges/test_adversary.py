@@ -18,10 +18,10 @@ LARGEST = {
     ("quotient", "phong"): 0.55,
     ("quotient", "ggx"): 0.53,
     ("quotient", "beckmann"): 0.62,
-    ("chord-local", "blinn"): 0.79,
-    ("chord-local", "ggx"): 0.80,
-    ("chord-local", "beckmann"): 0.78,
-    ("chord-local", "cosquad"): 0.78,
+    ("chord-local", "blinn"): 0.72,
+    ("chord-local", "ggx"): 0.71,
+    ("chord-local", "beckmann"): 0.69,
+    ("chord-local", "cosquad"): 0.70,
     ("renormalise", "blinn"): 0.55,
     ("renormalise", "ggx"): 0.54,
     ("renormalise", "beckmann"): 0.63,
@@ -34,10 +34,6 @@ LARGEST = {
 }
 """Largest errors of pixels that the long search found from seed 1, in LSB, rounded up. The table of
 docs/guide/accuracy.md is the same."""
-
-EXCESS = {"chord-local": 0.021}
-"""Excess over the bound of a frame that the search found, in LSB. The bound of `chord-local` is not proved,
-and does not hold everywhere: docs/guide/accuracy.md#the-adversary."""
 
 ROUNDS = 160
 
@@ -55,12 +51,12 @@ def test_short_search(method):
 @pytest.mark.long
 @pytest.mark.parametrize(("method", "model"), LARGEST)
 def test_long_search(method, model):
-    """No error exceeds the bound of its frame by more than documented, or the documented largest error."""
+    """No error exceeds the bound of its frame or the documented largest error."""
     adversary = Adversary(method, model, SEED)
     found = adversary.climb(ROUNDS)
     print(f"\nadversary, seed {SEED}: {method}, {model}: pixel {adversary.largest_pixel:.3f}, {found}")
     assert 0.4 < adversary.largest_pixel <= LARGEST[method, model]
-    assert adversary.excess <= EXCESS.get(method, 0), adversary.worst
+    assert adversary.excess <= 0, adversary.worst
 
 
 def test_documentation_has_the_largest_errors():

@@ -51,8 +51,14 @@ def test_steady_errors_keep_the_bound(method, model, name):
     for value in (1, 30, 900) if name == "exponent" else (sharpest, 0.3, 0.9):
         normals = [0, 0, 1] + rng.uniform(-0.9, 0.9, (3, 3)) * [1, 1, 0.3]
         scene = facing(normals, rng.normal((0, 0, 1.5)), rng.uniform(-2, 0.5, 3), **{name: value})
-        found = compare(scene, made(method, model, scene), model_frame(scene, made(method, model, scene)))
-        assert found.bound_lsb == pytest.approx(0.5 + 1 / 16 + 1 / 4)
+        design = made(method, model, scene)
+        found = compare(scene, design, model_frame(scene, design))
+        # A quarter of a step is left out of a lobe that has a scale.
+        left_out = 2.0**-19 if design.lobe.scale else 0
+        term = 0.2 + 255 * (design.lobe.line_error(value) + 3 * 2.0**-17 + left_out)
+        budgets = 0.5 + 3 / 128 + 0.02 * (0.12 + 255 * 2.0**-18) + 0.98 * term
+        expected = budgets if method == "chord-local" else 0.5 + 1 / 16 + 1 / 4
+        assert found.bound_lsb == pytest.approx(expected)
         assert found.target == model
         assert found.method_error.steady_lsb <= found.bound_lsb
         largest = max(largest, found.method_error.steady_lsb)
@@ -125,7 +131,7 @@ def test_an_unlit_surface_has_no_border(method, model):
     found = compare(scene, made(method, model, scene), model_frame(scene, made(method, model, scene)))
     assert (found.border_pixels, found.step_lsb) == (0, 0)
     assert 0.507 < found.method_error.steady_lsb <= found.bound_lsb
-    assert found.bound_lsb == pytest.approx(0.5 + (3 if method == "quotient" else 1) / 128)
+    assert found.bound_lsb == pytest.approx(0.5 + 3 / 128)
 
 
 @pytest.mark.parametrize("ambient", [0.0, 0.02, 0.3])

@@ -177,7 +177,7 @@ def test_cut_by_error_of_every_method(method):
     front = cosine[:, 0] > 1e-3
     error = 255 * np.abs(terms[0] - terms[1])[front]
     print(f"{method}: {error.max():.3f} LSB, {len(cut.length)} of {len(raster.length)}")
-    assert error.max() <= METHOD.HIGHLIGHT_BUDGET * 1.1
+    assert error.max() <= HighlightLimits.TOLERANCE * 1.1
 
 
 def test_cut_spans_chooses():

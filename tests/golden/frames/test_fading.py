@@ -13,9 +13,10 @@ from blysk.golden.frames.local import local_operands
 from blysk.golden.presets import preset
 from blysk.golden.reference.light import Light
 from blysk.golden.reference.raster import rasterise
+from blysk.golden.reference.reflection import COSQUAD
 from blysk.golden.reference.renderer import fragment_positions
 
-from .cuts import METHOD, ONE_VALUE, material
+from .cuts import METHOD, ONE_VALUE, exact_operands, material
 from .test_local import floor, lit_teapot
 
 HIGH = (0.5, 3.0, 0.5)
@@ -65,18 +66,24 @@ def test_teapot():
 
 
 def test_every_pixel_is_within_the_budgets():
-    """The quadratics alone keep the budgets of the cuts: a N·L within 0.12 LSB and a within 0.25 LSB."""
+    """The quadratics alone keep the budgets of the cuts, for a N·L and for the highlight times a."""
     scene = replace(floor([HIGH], 20), lights=(LIGHTS["spot"],))
     cut, _ = cut_by_error(scene, rasterise(scene), METHOD)
     values, factors = local_operands(scene, cut, factors=(0,))
-    cosine, _, factor = METHOD.exact_operands(values, cut.length, factors)
+    cosine, u, factor = METHOD.exact_operands(values, cut.length, factors)
     points = fragment_positions(scene, cut, np.arange(len(cut.span)))
     light = scene.lights[0]
     exact = light.factor(points)
     upright = np.einsum("fk,k->f", light.towards(points), [0.0, 1, 0])
-    assert 255 * np.abs(cosine[:, 0] - exact * upright).max() <= METHOD.DIFFUSE_BUDGET
-    # Where the highlight shows. Elsewhere a need not be right.
-    assert 255 * np.abs(factor[:, 0] - exact).max() <= METHOD.FACTOR_BUDGET + 0.01
+    assert (
+        255 * np.abs(np.maximum(ONE_VALUE * cosine[:, 0], 0) - exact * upright).max() <= METHOD.DIFFUSE_BUDGET
+    )
+    found, wanted = (COSQUAD.reflect(1 - of[:, 0], 20) for of in (u, exact_operands(scene, cut)[1]))
+    assert (
+        0.01
+        < 255 * np.abs(np.maximum(factor[:, 0], 0) * found - exact * wanted).max()
+        <= METHOD.HIGHLIGHT_BUDGET
+    )
 
 
 def test_operands_by_hand():
