@@ -129,7 +129,7 @@ class HighlightLimits:
         Without a design the exponents give the limits of ``cosquad``, for linear light.
         """
         materials, model = scene.materials, None if design is None else design.specular
-        reflection = COSQUAD if design is None else model and model.reflection
+        reflection = COSQUAD if design is None else None if model is None else model.reflection
         parameters: list[float | None] = [float(of.exponent) for of in materials]
         exponents = parameters
         if design is not None and design.specular is not None:

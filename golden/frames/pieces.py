@@ -110,8 +110,8 @@ class Pieces:
         wrong = self._flagged(setup, curves)
         judge = _Judge.of(self.scene, setup, curves, limits, material, scale)
         every, long = np.arange(len(wrong)), self.last - self.first >= 4
-        for k, t in ((1, 0.25), (3, 0.75)):
-            wrong |= long & judge.rejects(every, places[k], np.full(len(wrong), t))
+        for k, share in ((1, 0.25), (3, 0.75)):
+            wrong |= long & judge.rejects(every, places[k], np.full(len(wrong), share))
         left = np.flatnonzero(~wrong)
         pixels = _pixels_of(
             self.scene, self.raster, *(of[left] for of in (self.origin, self.first, self.last))
@@ -272,7 +272,8 @@ class _Judge:
             return off
         way = np.abs(self._fit("factor", piece, t) - exact.factor) + self.words["factor"][piece]
         largest = np.where((exact.diffuse > 0) | (behind > 0), np.maximum(term, np.maximum(near, far)), 0)
-        return exact.factor * off + np.where(self.fading, way * largest, 0)
+        whole: np.ndarray = exact.factor * off + np.where(self.fading, way * largest, 0)
+        return whole
 
 
 def _pixels_of(
