@@ -9,14 +9,20 @@ import click
 from blysk.golden.presets import MODEL_LINES
 from blysk.golden.reference.light import Triple
 from blysk.golden.reference.lobes import TabulatedModel
+from blysk.golden.reference.measured import MEASURED
 from blysk.sim.run_files import reads
 from blysk.sim.value_types import Choice, Number, PartError, Vector, shown
 
 __all__ = ["Direction", "ReflectionOption", "Roughness"]
 
+_MEASURED = "measured:"
+
 
 class ReflectionOption(Choice):
-    """A reflection model by its name, or the curve of a CSV file of measured points, see `TabulatedModel`."""
+    """A reflection model by its name, ``measured:NAME`` of a fit of `MEASURED`, or the curve of a CSV file.
+
+    The file has measured points, see `TabulatedModel`.
+    """
 
     def __init__(self) -> None:
         super().__init__("reflection model", MODEL_LINES)
@@ -25,12 +31,18 @@ class ReflectionOption(Choice):
 
     def get_metavar(self, param: click.Parameter, ctx: click.Context | None = None) -> str:
         """Placeholder in the help text: the names, or a file."""
-        return f"[{'|'.join(self.names)}|FILE.csv]"
+        return f"[{'|'.join(self.names)}|{_MEASURED}NAME|FILE.csv]"
 
     def check(self, value: Any) -> Any:
         """The value: the name of a model, or the curve that the file holds."""
         if isinstance(value, TabulatedModel):
             return value
+        if isinstance(value, str) and value.startswith(_MEASURED):
+            name = value.removeprefix(_MEASURED)
+            if name not in MEASURED:
+                known = f"give {_MEASURED} with {', '.join(list(MEASURED)[:-1])} or {list(MEASURED)[-1]}"
+                raise PartError("", f"{shown(value)} is no measured material", known)
+            return MEASURED[name].lobe(name)
         if not isinstance(value, str) or not value.lower().endswith(".csv"):
             return super().check(value)
         try:

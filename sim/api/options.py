@@ -265,7 +265,7 @@ DESIGN: dict[str, Option] = {
         ReflectionOption(),
         "blinn",
         "Reflection model. The method quotient serves all models; other methods serve all but phong. "
-        "FILE.csv: points of a curve over N.H.",
+        "measured:NAME: a fit of docs/theory/measured.md. FILE.csv: points of a curve over N.H.",
         "pipeline.model",
     ),
     "operand": Option(

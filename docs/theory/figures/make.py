@@ -27,6 +27,7 @@ MODULES: dict[str, tuple[str, ...]] = {
     "interpolation_numbers": ("interpolation.md",),
     "chord_numbers": ("chord.md",),
     "units_numbers": ("units.md",),
+    "measured_numbers": ("measured.md",),
     "published_numbers": ("errata.md", "figures.md"),
 }
 """Pages of each module of numbers."""

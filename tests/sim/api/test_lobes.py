@@ -56,6 +56,11 @@ def test_curve_of_a_file(tmp_path):
     assert design_of(settings, 1).model == "satin"
 
 
+def test_measured_material():
+    settings = read_settings("teapot", {"model": "measured:nickel", **SMALL}, {**SCENE, **DESIGN})
+    assert design_of(settings, 1).model == "nickel"
+
+
 @pytest.mark.long
 def test_each_lobe_has_a_bank():
     scene = many(3)
@@ -82,6 +87,10 @@ def test_too_many_lobes_are_refused():
         ({"roughness": float("nan")}, "out of range; give a number greater than 0 and at most 1"),
         ({"model": "none.csv"}, "cannot be opened (No such file or directory); give a .csv file of cosines"),
         ({"model": "velvet"}, "unknown"),
+        (
+            {"model": "measured:velvet"},
+            "is no measured material; give measured: with alum-bronze, blue-metallic",
+        ),
     ],
 )
 def test_bad_input(options, message):
