@@ -190,8 +190,10 @@ def test_small_netlist(name):
     assert found["luts"] > 0
     if name in WITHOUT_LUT_RAM:
         assert found["flip_flops"] == registers + 8 * 16
-        clocked = parts(count_cells(Parts(), name, clocked=True), name)
-        assert clocked["flip_flops"] < registers + 8 * 16
+        if name == "ice40":
+            # A block RAM of GateMate is not taken for so few words.
+            clocked = parts(count_cells(Parts(), name, clocked=True), name)
+            assert clocked["flip_flops"] < registers + 8 * 16
     else:
         assert found["flip_flops"] == registers
         assert found["distributed_rams"] > 0
