@@ -345,6 +345,10 @@ class ShadingPipeline:
             has, lack = ("no", "have") if self.albedo is None else ("an", "lack")
             raise ValueError(f"the design has {has} albedo, and the spans {lack} attributes")
 
+    def sent(self, spans: Spans, constants: Sequence[FrameConstants]) -> Spans:
+        """Spans as the hardware takes them, see `Interpolator.sent`."""
+        return self.interpolator.sent(spans, constants, self.specular is not None)
+
     def operands(self, spans: Spans, constants: FrameConstants) -> Operands:
         """Bit-accurate operands of every pixel of spans, each of one pixel or more, in their order."""
         return self.interpolator.operands(spans, constants, self.specular is not None)

@@ -47,6 +47,8 @@ PORT_DESCRIPTIONS = {
     "i_start": "N/W at the first pixel centre, in each light's frame: H along z, L and V in the xz plane",
     "i_step": "step of N/W to the next pixel, times 2^i_exponent",
     "i_exponent": "exponent of i_step, 0 to 15",
+    "i_line": "exact product of i_start and sin a, cos a of each light, as above",
+    "i_line_step": "exact product of i_step and sin a, cos a of each light, as above",
     "i_material": "index of the span's material; an index past the last material counts as the last",
     "i_attributes_start": "attributes at the first pixel centre, in the order above",
     "i_attributes_step": "step of the attributes to the next pixel, times 2^i_attributes_exponent",

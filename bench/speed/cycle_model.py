@@ -85,10 +85,10 @@ def beat_cycles(length: np.ndarray, lanes: int) -> int:
     pixels or more have differences. Let p be the span with differences before span k, and f_p the cycle in
     which its first differences are taken.
 
-    - The last turn of span k is in ``g_k = t_k`` if it has one pixel, in ``max(t_k + 1, f_p - 3)`` if it is a
-      pair, and a cycle later if it has more pixels. Then ``t_(k+1) = g_k + 1``.
-    - ``f_k = max(g_k + 5, s_p + max(b_p - 1, 1))``
-    - ``s_k = max(s_(k-1) + b_(k-1), t_k + 5, f_k + 1)``
+    - The last turn of span k is in ``g_k = t_k`` if it has one or two pixels. If it has more, the turn is in
+      ``g_k = max(t_k, f_p - 4) + 1``. Then ``t_(k+1) = g_k + 1``.
+    - ``f_k = max(g_k + 5, s_p + b_p - 1)``
+    - ``s_k = max(s_(k-1) + b_(k-1), g_k + 5, f_k + 1)``
     - `QuotientLanesUnit.DEPTH` limits the starts that wait: ``t_k >= s_(k-14) - 1``.
 
     Parameters
@@ -104,12 +104,12 @@ def beat_cycles(length: np.ndarray, lanes: int) -> int:
     for pixels, beats in zip(length.tolist(), (-(-length // lanes)).tolist(), strict=True):
         if len(starts) >= waiting:
             turn = max(turn, starts[-waiting] - 1)
-        last, start = turn, max(free, turn + 5)
+        last = turn if pixels <= 2 else max(turn, taken - 4) + 1
+        start = max(free, last + 5)
         if pixels > 1:
-            last = max(turn + 1, taken - 3) + (pixels > 2)
             taken = max(last + 5, room)
             start = max(start, taken + 1)
-            room = start + max(beats - 1, 1)
+            room = start + beats - 1
         first = start if first is None else first
         starts.append(start)
         turn, free = last + 1, start + beats

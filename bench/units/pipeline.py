@@ -33,6 +33,7 @@ from blysk.bench.units.pipeline_spans import (
     spans_in_highlight,
     spans_near_terminator,
     tabled,
+    with_lines,
 )
 from blysk.bench.units.record import Case, Record, Stimulus, Variant, first, once, together
 from blysk.bench.units.sample import Sample
@@ -138,7 +139,7 @@ def spans_of(design: ShadingPipeline, beats) -> Spans:
     if "attributes" in beats:
         attributes = attributes_in(design.albedo, beats["attributes"])
     if "step" in beats:
-        vectors = SpanVectors(*(beats[name] for name in SpanVectors._fields))
+        vectors = SpanVectors(*(beats.get(name) for name in SpanVectors._fields))
     return Spans(*of_span, *normals, *further, vectors, attributes)
 
 
@@ -180,10 +181,12 @@ _ORDERED = LOBE_ADDRESS, BANK_ADDRESS, TEXELS_ADDRESS, TEXEL_ADDRESS
 
 def case_of(unit, spans: Spans, constants, *before: int) -> Case:
     """Input of spans and constants of each material. First all constants get each of the codes ``before``."""
-    write = writes_of(constants if isinstance(constants, list) else [constants])
+    design, constants = unit.model, constants if isinstance(constants, list) else [constants]
+    write = writes_of(constants)
     kept = np.isin(write["address"], _ORDERED)
     parts = [{"address": write["address"], "data": np.where(kept, write["data"], code)} for code in before]
-    return Case(beats_of(unit, ends_for(unit.model, spans)), write=together([*parts, write]))
+    spans = with_lines(design, ends_for(design, spans), constants)
+    return Case(beats_of(unit, spans), write=together([*parts, write]))
 
 
 def _spans(unit, rng, count):
@@ -327,11 +330,11 @@ def _frames(unit, rng, count):
             write.append(_lost(rng, design))
         if writes and rng.random() < 0.6:
             write = [_disordered(rng, write[0], rng.choice([0.3, 1.0, 1.0]))]
-        frames.append(frame)
+        frames.append(with_lines(design, ends_for(design, frame), constants))
         writes.append(together(write))
         after.append(after[-1] + len(frame))
     places = np.repeat(after[:-1], [len(write["data"]) for write in writes])
-    beats = together([beats_of(unit, ends_for(design, frame)) for frame in frames])
+    beats = together([beats_of(unit, frame) for frame in frames])
     return Case(beats, write=together(writes), write_after=places)
 
 

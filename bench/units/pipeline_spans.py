@@ -57,6 +57,7 @@ __all__ = [
     "spans_near_terminator",
     "tabled",
     "vectors_for",
+    "with_lines",
 ]
 
 _LONG_AND_SHORT = ((200, 4095), (3000, 12))
@@ -238,6 +239,14 @@ def vectors_for(rng: np.random.Generator, design: ShadingPipeline, length: np.nd
         pair = np.flatnonzero(length == 2)
         vectors.step[pair] = vectors.start[rng.permutation(len(length))[: len(pair)]]
     return vectors
+
+
+def with_lines(design: ShadingPipeline, spans: Spans, constants: list[FrameConstants]) -> Spans:
+    """Spans with the lines that a pipeline with several lanes takes, from the constants of each material."""
+    if not design.interpolator.pairs or design.specular is None or not design.lights:
+        return spans
+    direction = np.stack([of.direction[:, ::2] for of in constants])[spans.material]
+    return replace(spans, vectors=design.interpolator.with_lines(spans.vectors, direction, True))
 
 
 def spans_in_frame(spans: Spans, light: np.ndarray, halfway: np.ndarray) -> tuple[Spans, np.ndarray]:

@@ -35,7 +35,11 @@ def separate_pairs(vectors: SpanVectors, length: np.ndarray) -> tuple[SpanVector
     start = np.where(second[:, np.newaxis], vectors.step[span], vectors.start[span])
     step = np.where(single, 0, vectors.step[span])
     exponent = np.where(single[:, 0], 0, vectors.exponent[span])
-    return SpanVectors(start, step, exponent), np.where(pair, 1, length)[span], span
+    apart = SpanVectors(start, step, exponent)
+    if vectors.line is not None and vectors.line_step is not None:
+        line = np.where(second[:, np.newaxis], vectors.line_step[span], vectors.line[span])
+        apart = apart._replace(line=line, line_step=np.where(single, 0, vectors.line_step[span]))
+    return apart, np.where(pair, 1, length)[span], span
 
 
 @dataclass(frozen=True)
@@ -46,6 +50,9 @@ class QuotientLanes(QuotientSpans):
     of two pixels is a *pair*: its step is the vector at the second pixel, and its exponent has no effect.
     Both vectors of a pair may have scales of their own, so each pixel of a pair has the words of a span of
     one pixel.
+
+    With highlights a span brings its lines, exact l of ``start`` and of ``step``. So the hardware has no
+    multiplier for them. The line of a pixel is the same to the bit.
 
     Parameters
     ----------
@@ -68,6 +75,18 @@ class QuotientLanes(QuotientSpans):
         super().__post_init__()
         if self.lanes != 2:
             raise ValueError(f"lanes must be 2, not {self.lanes}")
+
+    @property
+    def brings_lines(self) -> bool:
+        """``True`` with highlights. Without highlights l is z, times a constant."""
+        return self.highlights
+
+    def with_lines(self, vectors: SpanVectors, direction: np.ndarray) -> SpanVectors:
+        """Vectors with their lines; see `QuotientSpans.line` for the direction."""
+        if not self.brings_lines:
+            return vectors
+        lines = (self.line(vector, direction) for vector in (vectors.start, vectors.step))
+        return vectors._replace(**dict(zip(("line", "line_step"), lines, strict=True)))
 
     def compute(
         self, vectors: SpanVectors, length: np.ndarray, direction: np.ndarray | None = None

@@ -31,17 +31,21 @@ class SpanVectors(NamedTuple):
         Codes of ``SQ(1, 17)``, from ``-(2^17 - 1)`` to ``2^17 - 1``.
     exponent : int64 array, shape (spans,)
         0 to 15.
+    line, line_step : int64 arrays, shape (spans, lights), optional
+        Exact l of ``start`` and of ``step``, see `QuotientSpans.line`. Only if the span brings its lines.
     """
 
     start: np.ndarray
     step: np.ndarray
     exponent: np.ndarray
+    line: np.ndarray | None = None
+    line_step: np.ndarray | None = None
 
     def __getitem__(self, which: Any) -> Any:
         """Some of the spans, by a slice, indices or a mask; or a field, by its number."""
         if isinstance(which, int):
             return tuple.__getitem__(self, which)
-        return SpanVectors(*(field[which] for field in tuple(self)))
+        return SpanVectors(*(None if field is None else field[which] for field in tuple(self)))
 
     @classmethod
     def quantise(cls, left: np.ndarray, right: np.ndarray, length: np.ndarray) -> "SpanVectors":
@@ -184,6 +188,7 @@ class QuotientSpans:
     COMPONENT_FORMAT = SQ(1, 17)
     EXPONENT_FORMAT = UQ(4, 0)
     LINE_FORMAT = SQ(2, 36)
+    EXACT_LINE_FORMAT = SQ(2, 34)
     HEIGHT_FORMAT = SQ(1, 29)
     ONE = 2**17 - 2
     """Code of length 1 of L. After rounding the code's length is under 1, so the line never outgrows v."""
@@ -208,6 +213,11 @@ class QuotientSpans:
         return (*names, "s0") if self.mirror else names
 
     @property
+    def brings_lines(self) -> bool:
+        """Whether spans bring l of start and step, so that the hardware does not multiply for them."""
+        return False
+
+    @property
     def takes_heights(self) -> bool:
         """Whether the sign of z counts: with highlights of N·H."""
         return self.highlights and not self.mirror
@@ -230,15 +240,42 @@ class QuotientSpans:
         found: np.ndarray = np.rint(np.stack([sine, cosine], axis=-1) * self.ONE).astype(np.int64)
         return found
 
+    def line(self, vector: np.ndarray, direction: np.ndarray | None = None) -> np.ndarray:
+        """Exact l of vectors: int64 codes of `EXACT_LINE_FORMAT`, shape (spans, lights).
+
+        Parameters
+        ----------
+        vector : int64 array, shape (spans, components)
+            Codes of the vectors.
+        direction : int64 array, shape (lights, 2) or (spans, lights, 2)
+            Codes of sin a and cos a, see `codes_of`; not used without highlights.
+
+        Raises
+        ------
+        ValueError
+            If there are highlights and no direction, or a code of the direction is out of range.
+        """
+        place = {name: index for index, name in enumerate(self.components)}
+        height = np.asarray(vector, np.int64)[:, [place[f"z{k}"] for k in range(self.lights)]]
+        if not self.highlights:
+            scaled: np.ndarray = height * self.ONE
+            return scaled
+        if direction is None:
+            raise ValueError("highlights need sin a and cos a of each light")
+        codes = Fixed(self.COMPONENT_FORMAT, direction).codes
+        across = np.asarray(vector, np.int64)[:, [place[f"x{k}"] for k in range(self.lights)]]
+        turned: np.ndarray = across * codes[..., 0] + height * codes[..., 1]
+        return turned
+
     def differences(self, vectors: SpanVectors, direction: np.ndarray | None = None) -> QuotientWords:
         """Bit-accurate starts and differences.
 
         Parameters
         ----------
         vectors : SpanVectors
-            The spans.
+            The spans. Lines that they bring are taken.
         direction : int64 array, shape (lights, 2)
-            Codes of sin a and cos a, see `codes_of`; not used without highlights.
+            Codes of sin a and cos a, see `codes_of`; not used without highlights, or if spans bring lines.
 
         Raises
         ------
@@ -258,23 +295,13 @@ class QuotientSpans:
         first = ((products(start, step) << (fraction + 1)) >> shift) + (second >> 1)
         squares = products(start, start) << fraction, first, second
 
-        codes = None
-        if self.highlights:
-            if direction is None:
-                raise ValueError("highlights need sin a and cos a of each light")
-            codes = Fixed(self.COMPONENT_FORMAT, direction).codes
-
-        def line(vector: np.ndarray) -> np.ndarray:
-            height = vector[:, [place[f"z{k}"] for k in range(self.lights)]]
-            if codes is None:
-                scaled: np.ndarray = height * self.ONE
-                return scaled
-            across = vector[:, [place[f"x{k}"] for k in range(self.lights)]]
-            turned: np.ndarray = across * codes[:, 0] + height * codes[:, 1]
-            return turned
-
+        given = (vectors.line, vectors.line_step)
+        line, line_step = (
+            self.line(vector, direction) if codes is None else Fixed(self.EXACT_LINE_FORMAT, codes).codes
+            for codes, vector in zip(given, (start, step), strict=True)
+        )
         fraction = self.LINE_FORMAT.fraction_bits - 34
-        lines = line(start) << fraction, (line(step) << fraction) >> shift
+        lines = line << fraction, (line_step << fraction) >> shift
         heights = (np.empty((len(exponent), 0), dtype=np.int64),) * 2
         if self.takes_heights:
             chosen = [place[f"z{k}"] for k in range(self.lights)]

@@ -249,6 +249,11 @@ class Interpolator(ABC):
         """
         return self
 
+    @property
+    def serves_lanes(self) -> bool:
+        """Whether a pipeline of the method can have several lanes."""
+        return False
+
     def for_lanes(self, lanes: int) -> "Interpolator":
         """The method for a pipeline with a number of lanes.
 
@@ -261,10 +266,19 @@ class Interpolator(ABC):
             raise BuildError("lanes", f"method {self.name} makes single pixels", "take the method quotient")
         return self
 
-    def sent(self, spans: Spans) -> Spans:
+    def sent(self, spans: Spans, constants: Sequence[FrameConstants] = (), highlights: bool = True) -> Spans:
         """Spans as the pipeline takes them, with the same pixels in the same order.
 
-        With several lanes neighbouring spans may become one span.
+        With several lanes neighbouring spans may become one span, and spans may bring more words.
+
+        Parameters
+        ----------
+        spans : Spans
+            The spans.
+        constants : sequence of FrameConstants
+            Constants of each material, for words that depend on them. Empty: these words are left out.
+        highlights : bool
+            Whether there is specular light.
         """
         return spans
 

@@ -8,9 +8,9 @@ import numpy as np
 
 from blysk.golden.beats import Spans
 from blysk.golden.cosines.quotient import Quotient
-from blysk.golden.cosines.quotient_lanes import separate_pairs
+from blysk.golden.cosines.quotient_lanes import QuotientLanes, separate_pairs
 from blysk.golden.cosines.quotient_spans import MARGIN, QuotientSpans, SpanVectors
-from blysk.golden.frame_constants import FrameConstants, LightMeanings
+from blysk.golden.frame_constants import NOT_READ, FrameConstants, LightMeanings
 from blysk.golden.lighting.highlight_operand import HighlightOperand
 from blysk.golden.lighting.quotient_lobe import QuotientLobe
 from blysk.golden.methods.frame_steps import Bound, ErrorBounds, ExactShading, SpanCutter, SpanFiller
@@ -91,6 +91,11 @@ class QuotientInterpolator(Interpolator):
         return True
 
     @property
+    def serves_lanes(self) -> bool:
+        """``True``, with pairs."""
+        return True
+
+    @property
     def lights_share_words(self) -> bool:
         """``True``: vectors of all lights have one exponent, and q of the first light serves all."""
         return True
@@ -98,6 +103,8 @@ class QuotientInterpolator(Interpolator):
     @property
     def light_meanings(self) -> LightMeanings:
         """Texts for L in the frame of the light, where H is z."""
+        if self.pairs:
+            return NOT_READ
         return LightMeanings("sin a, 0, cos a of the light's frame", "not read", "2^17 - 2")
 
     def matched(self, specular: HighlightOperand | None) -> "QuotientInterpolator":
@@ -109,10 +116,32 @@ class QuotientInterpolator(Interpolator):
         """The method, with pairs for several lanes."""
         return self if (lanes > 1) == self.pairs else replace(self, pairs=lanes > 1)
 
-    def sent(self, spans: Spans) -> Spans:
-        """Spans in which two neighbours of one pixel each become a pair, if the pipeline takes pairs."""
+    def sent(self, spans: Spans, constants: Sequence[FrameConstants] = (), highlights: bool = True) -> Spans:
+        """Spans with pairs and lines, if the pipeline takes pairs.
+
+        Two neighbours of one pixel each become a pair. Each span brings its lines, see `QuotientLanes`.
+        """
         if not self.pairs or spans.vectors is None:
             return spans
+        joined = self._joined(spans)
+        if not len(constants) or joined.vectors is None:
+            return joined
+        direction = np.stack([np.asarray(of.direction)[:, ::2] for of in constants])
+        return replace(
+            joined, vectors=self.with_lines(joined.vectors, direction[joined.material], highlights)
+        )
+
+    def with_lines(self, vectors: SpanVectors, direction: np.ndarray, highlights: bool) -> SpanVectors:
+        """Vectors with the lines that a pipeline with several lanes takes, if there are highlights.
+
+        ``direction`` has codes of sin a and cos a, shape (lights, 2) or (spans, lights, 2).
+        """
+        lights = direction.shape[-2]
+        return QuotientLanes(lights, highlights, self.mirror and highlights).with_lines(vectors, direction)
+
+    def _joined(self, spans: Spans) -> Spans:
+        """Spans in which two neighbours of one pixel each are a pair."""
+        assert spans.vectors is not None
         after = [np.asarray(column)[1:] for column in (spans.x, spans.y, spans.length, spans.material)]
         x, y, length, material = (
             np.asarray(column)[:-1] for column in (spans.x, spans.y, spans.length, spans.material)
@@ -124,7 +153,8 @@ class QuotientInterpolator(Interpolator):
         place = np.arange(len(joins))
         place -= begins[np.maximum(np.searchsorted(begins, place, "right") - 1, 0)] if len(begins) else 0
         first = np.flatnonzero(joins & (place % 2 == 0))
-        vectors = SpanVectors(*(codes.copy() for codes in spans.vectors))
+        given = spans.vectors
+        vectors = SpanVectors(given.start.copy(), given.step.copy(), given.exponent.copy())
         vectors.step[first], vectors.exponent[first] = vectors.start[first + 1], 0
         lengths = np.array(spans.length)
         lengths[first] = 2
@@ -140,7 +170,7 @@ class QuotientInterpolator(Interpolator):
 
     def input_lines(self, lights: int, highlights: bool, factors: Sequence[int]) -> list[str]:
         """Lines that describe vectors and their frames, see `Interpolator.input_lines`."""
-        model = self.spans(lights, highlights)
+        model, written = self.spans(lights, highlights), highlights and not self.pairs
         mirrored = (
             ["i_start: y_k is times cos a of light k; s0 is y of light 0 times its sin a"]
             if model.mirror
@@ -177,14 +207,28 @@ class QuotientInterpolator(Interpolator):
             *(
                 [
                     "i_length 2 is a pair: i_start and i_step are v at both pixels, each in a scale of its "
-                    "own; i_exponent is not read"
+                    "own; i_exponent is not read",
+                    *self._line_lines(highlights),
                 ]
                 if self.pairs
                 else ["i_length: divide a span of two pixels into two spans of one pixel, whose step is 0"]
             ),
             "i_length: after these cuts no |v| is under 1/128; a span with a shorter v is wrong, "
             "and counted in status_out_of_range_spans",
-            *([f"constants: as L write sin a, 0, cos a, times {model.ONE}; H is not read"] * highlights),
+            *([f"constants: as L write sin a, 0, cos a, times {model.ONE}; H is not read"] * written),
+        ]
+
+    @staticmethod
+    def _line_lines(highlights: bool) -> list[str]:
+        """Lines that describe the lines that spans bring, for several lanes."""
+        if not highlights:
+            return []
+        model = QuotientLanes()
+        return [
+            f"sine, cosine: sin a and cos a of light k, times {model.ONE}, rounded; L, H are not read",
+            "i_line: for light k the exact number x_k sine + z_k cosine, with the codes of i_start, "
+            f"in {model.EXACT_LINE_FORMAT}",
+            "i_line_step: the same number, with the codes of i_step",
         ]
 
     def geometry(self, lights: int) -> "Geometry":

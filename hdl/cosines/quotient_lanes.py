@@ -8,6 +8,7 @@ from amaranth.lib import data, stream
 
 from blysk.golden.cosines.quotient_lanes import QuotientLanes
 from blysk.golden.number.spans import LENGTH_BITS
+from blysk.hdl.core.memory import connect_headed_fifo, connect_wide_fifo
 from blysk.hdl.cosines.quotient import pixel_words_shape
 from blysk.hdl.cosines.quotient_spans import QuotientSpansUnit
 
@@ -29,10 +30,12 @@ class QuotientLanesUnit(QuotientSpansUnit):
     A beat has the next two pixels of a span. The first beat begins at the span's first pixel, at any column.
     If a span has an odd number of pixels, the last beat has one pixel. A lane without a pixel has words of 0.
 
-    *Setup.* It is the setup of `QuotientSpansUnit`, with the same multipliers. A span of two pixels is a
-    *pair*: its step is the vector at the second pixel, with any scale of its own, and its exponent is not
-    read. So the first differences of a pair are the words of the second pixel. A pair takes two cycles, a
-    longer span three cycles.
+    *Setup.* A span of two pixels is a *pair*: its step is the vector at the second pixel, with any scale of
+    its own, and its exponent is not read. So the first differences of a pair are the words of the second
+    pixel. There are two multipliers for each squared component. The first of them makes starts. The second
+    makes first differences in the same cycle, and second differences in a cycle before. So a span of three
+    pixels or more takes two cycles, and no span takes more cycles than it has beats. Spans bring their lines,
+    which then need no multiplier. First differences wait in a FIFO, second differences in registers.
 
     *Accumulators.* Beat j has the pixels 2 j and 2 j + 1. With ``D1`` and ``D2`` of `QuotientSpans`, three
     words of each square change from beat to beat:
@@ -46,9 +49,10 @@ class QuotientLanesUnit(QuotientSpansUnit):
     ===================== ================== ============
 
     With a first difference F before the half h of a second difference is added, and b, the last bit of
-    ``D2 = 2 h + b``, the first step is ``2 F + 4 h + b``. So it takes one addition. Differences are taken as
-    in `QuotientSpansUnit`, with beats in place of pixels. The gap of the next span waits in a register until
-    its start is taken, because the gap of the last beat is still needed.
+    ``D2 = 2 h + b``, the first step is ``2 F + 4 h + b``. So it takes one addition. The step's register has
+    2 F before. Half of this register and h are the first gap, and half of it and ``3 h + 2 b`` the following
+    gaps. So gaps have no accumulators. Differences are taken as in `QuotientSpansUnit`, with beats in place
+    of pixels.
 
     The first beat of a span is on the output `latency` cycles after an empty unit has accepted the span. For
     a span of one pixel these are `short_latency` cycles. Payloads are registers.
@@ -62,21 +66,32 @@ class QuotientLanesUnit(QuotientSpansUnit):
 
     Members
     -------
-    i, constants, begun
-        Those of `QuotientSpansUnit`.
+    i, begun
+        Those of `QuotientSpansUnit`. With highlights spans bring lines, and the unit has no ``constants``.
     o : :py:`Out(stream.Signature(lane_words_shape(model)))`
         Words of the pixels.
 
     Source: docs/theory/quotient.md#lanes.
     """
 
+    _registers = 1
+
+    FIRSTS = 4
+    """Largest number of waiting first differences."""
+
     def __init__(self, model: QuotientLanes | None = None, length_bits: int = LENGTH_BITS):
         super().__init__(model or QuotientLanes(), length_bits)
+        self.initiation_interval = 2
         self.latency += 1
         self.short_latency += 1
 
     def _output_shape(self) -> data.Layout:
         return lane_words_shape(self.model)
+
+    @property
+    def multipliers(self) -> int:
+        """Number of multipliers."""
+        return 2 * sum(map(len, self.model.squares))
 
     @property
     def spans_inside(self) -> int:
@@ -85,21 +100,8 @@ class QuotientLanesUnit(QuotientSpansUnit):
 
     # Setup.
 
-    def _turn_of_a_pair(self, m: Module, moves: Value, begun: Value, is_second: Value) -> Value:
-        paired, valid = Signal(name="is_pair"), self.i.valid
-        with m.If(moves):
-            is_pair = self._is_pair(self.i.payload.length)
-            m.d.sync += paired.eq(Mux(begun, paired & ~valid, valid & is_pair))
-        return paired
-
     @staticmethod
-    def _is_pair(length: Value) -> Value:
-        return length[1] & ~length[0] & ~length[2:].any()
-
-    def _counted(self, length: Value) -> Value:
-        return (length - 1)[: len(length)]
-
-    def _few_of(self, last: Value) -> Value:
+    def _few_of(last: Value) -> Value:
         """Five bits, from the index of the last pixel.
 
         Whether there are two pixels or more; whether there are at most one, two, three beats; whether the
@@ -109,20 +111,110 @@ class QuotientLanesUnit(QuotientSpansUnit):
         few = ~beats.any(), ~beats[1:].any(), ~beats[2:].any() & ~beats[:2].all()
         return Cat(last.any(), *few, last[0] & ~beats.any())
 
-    def _amounts(
-        self, m: Module, arrives: Value, delayed: Callable, paired: Value, b: Any, amounts: Any
-    ) -> tuple[Value, Value]:
-        """Shifts of lines and of squares. Store whether first differences are of a pair, and signs of z."""
-        p, before = self.model, self._SUMS - 1
-        held = delayed(paired, "paired", before)
-        signs = [b[f"z{light}"][-1] for light in range(p.lights)] if p.takes_heights else []
-        late = [delayed(held, "paired", self._SHIFTED - 1, before + 1)]
-        late += [delayed(sign, f"sign_{light}", self._SHIFTED - 1) for light, sign in enumerate(signs)]
-        self._marks = Signal(len(late), name="marks", reset_less=True)
-        with m.If(arrives):
-            m.d.sync += self._marks.eq(Cat(late))
-        # The square of the second vector is shifted as far as that of the first vector.
-        return Mux(held, 0, amounts[0]), Mux(held, 1, amounts[1])
+    def _set_up(self, m: Module, second, first, start: stream.Interface) -> None:
+        """Turns, products, sums and shifts, up to differences and starts that wait."""
+        p, span, valid = self.model, self.i.payload, self.i.valid
+        moves, begun = Signal(name="moves"), Signal(name="has_begun")
+        # A longer span takes a cycle for its second differences, and then the cycle that ends every span.
+        is_long = span.length[1:].any()
+        is_pair = is_long & ~span.length[0] & ~span.length[2:].any()
+        is_second = ~begun & is_long & ~is_pair
+        ends = begun | ~is_long | is_pair
+        m.d.comb += [self.i.ready.eq(moves & ends), self.begun.eq(begun)]
+        with m.If(moves):
+            m.d.sync += begun.eq(Mux(begun, ~valid, valid & is_second))
+        register, delayed, product = self._stages(m, moves)
+        # For each stage three signals tell its words: second difference, first difference, start.
+        here = [[valid & is_second, valid & is_long & ends, valid & ends]]
+        for stage in range(1, self._SHIFTED):
+            held = [Signal(name=f"{name}_at_{stage}") for name in ("second", "first", "start")]
+            with m.If(moves):
+                m.d.sync += [signal.eq(before) for signal, before in zip(held, here[-1], strict=True)]
+            here.append(held)
+
+        begin, step = (
+            {name: vector[at].as_value() for at, name in enumerate(p.components)}
+            for vector in (span.start, span.step)
+        )
+
+        def squares(a: dict[str, Value], b: dict[str, Value], kind: str) -> list[Value]:
+            found = []
+            for number, names in enumerate(p.squares):
+                products = [product(a[name], b[name], f"{kind}_{name}") for name in names]
+                found.append(register(sum(products[1:], products[0]), f"{kind}_sum_{number}"))
+            return found
+
+        at_sums, at_coarse = here[self._SUMS], here[self._SUMS + 1]
+        starts, changes = self._lines(register, delayed, (begin, step), is_second)
+        to_start = stream.Signature(start.payload.shape()).create(path=("to_start",))
+        m.d.comb += [
+            to_start.valid.eq(at_sums[2] & moves),
+            to_start.payload.length.eq(delayed((span.length - 1)[: self.length_bits], "length", self._SUMS)),
+        ]
+        sums, words = (*squares(begin, begin, "start"), *starts), to_start.payload
+        for total, word in zip(sums, (*words.squares, *words.lines), strict=True):
+            m.d.comb += word.eq(total[: len(word)])
+        if p.takes_heights:
+            for light, height in enumerate(words.heights):
+                m.d.comb += height.eq(delayed(begin[f"z{light}"], f"height_{light}", self._SUMS))
+        self._few = connect_headed_fifo(m, "starts", to_start, start, self._few_of(words.length), self.DEPTH)
+
+        # The square of the second vector of a pair is shifted as far as that of the first vector.
+        before = self._SUMS - 1
+        paired, exponent = delayed(is_pair, "paired", before), delayed(span.exponent, "exponent", before)
+        doubled = Mux(here[before][0], Cat(Const(0, 1), exponent), exponent)[:5]
+        amount = register(Mux(paired, 1, doubled), "amount")
+        exponent = register(Mux(paired, 0, exponent), f"exponent_{self._SUMS}")
+        operand = {name: Mux(begun, begin[name], step[name]) for name in begin}
+        shifted = self._shifted(register, (squares(operand, step, "change"), amount), (changes, exponent))
+        # Marks of first differences: whether they are of a pair, and signs of the second vector's z.
+        marks = [delayed(paired, "paired", self._SHIFTED - 1, self._SUMS)]
+        signs = [step[f"z{light}"][-1] for light in range(p.lights)] if p.takes_heights else []
+        marks += [delayed(sign, f"sign_{light}", self._SHIFTED - 1) for light, sign in enumerate(signs)]
+        # First differences of pairs may come on every cycle, so they wait in a FIFO.
+        shape = data.StructLayout({"words": first[0].shape(), "marks": len(marks)})
+        made, waiting = (stream.Signature(shape).create(path=(name,)) for name in ("made", "waiting"))
+        for word, value in zip(
+            (*made.payload.words.squares, *made.payload.words.lines), shifted, strict=True
+        ):
+            m.d.comb += word.eq(value[: len(word)])
+        m.d.comb += [
+            made.payload.marks.eq(Cat(marks)),
+            made.valid.eq(at_coarse[1] & moves),
+            first[0].eq(waiting.payload.words),
+            first[1].eq(waiting.valid),
+        ]
+        connect_wide_fifo(m, "firsts", made, waiting, self.FIRSTS)
+        self._firsts, self._marks = waiting, waiting.payload.marks
+        waits = (at_coarse[0] & second[1]) | (at_coarse[1] & ~made.ready) | (at_sums[2] & ~to_start.ready)
+        m.d.comb += moves.eq(~waits)
+        with m.If(moves & at_coarse[0]):
+            m.d.sync += second[1].eq(1)
+            for target, value in zip((*second[0].squares, *second[0].lines), shifted, strict=True):
+                m.d.sync += target.eq(value[: len(target)])
+
+    def _lines(
+        self, register: Callable, delayed: Callable, vectors: Any, is_second: Value
+    ) -> tuple[list[Value], list[Value]]:
+        """Lines of starts and of differences. With second differences it is z times 2^16, if z is taken."""
+        p, span, found = self.model, self.i.payload, []
+        for kind, vector in zip(("start", "change"), vectors, strict=True):
+            lines = []
+            for light in range(p.lights):
+                height = vector[f"z{light}"]
+                if p.brings_lines:
+                    line = (span.line if kind == "start" else span.line_step)[light].as_value()
+                    if kind == "change" and p.takes_heights:
+                        line = Mux(is_second, height << 16, line)
+                else:
+                    # The constant is `QuotientSpans.ONE`.
+                    line = (height << 17) - (height << 1)
+                lines.append(delayed(line, f"{kind}_line_{light}", self._SUMS))
+            found.append(lines)
+        return found[0], found[1]
+
+    def _halved(self, takes_first: Value) -> Value:
+        return takes_first & ~self._marks[0]
 
     # Beats.
 
@@ -142,20 +234,25 @@ class QuotientLanesUnit(QuotientSpansUnit):
         # Whether the last beat of a span has two pixels.
         even = Signal(name="even")
         takes_differences, one, at_most_two, at_most_three, self._starts_pair = self._few
+        starts = takes[2] & takes_differences
+        starts_three = starts & ~self._starts_pair
+        # A span of one or two beats needs no second differences any more when it starts, and a pair no first
+        # differences.
+        soon_first = may_first | (starts & self._starts_pair)
         m.d.comb += [
-            takes[0].eq(waits[0] & may_second),
-            takes[1].eq(waits[1] & may_first & (has_second | self._marks[0])),
+            takes[0].eq(waits[0] & (may_second | (starts_three & at_most_two))),
+            takes[1].eq(waits[1] & soon_first & (has_second | self._marks[0])),
+            self._firsts.ready.eq(advance & takes[1]),
             takes[2].eq(start.valid & last & (self._ready | ~takes_differences)),
             advance.eq(~shown | self.o.ready),
             self.o.valid.eq(shown),
         ]
-        starts = takes[2] & takes_differences
         following = [
             Mux(takes[2], one, two),
             Mux(takes[2], at_most_two, three),
             Mux(takes[2], at_most_three, three | (left == 3)),
-            (takes[0] | has_second) & ~(starts & ~self._starts_pair),
-            (takes[1] | self._ready) & ~starts,
+            takes[0] | (has_second & ~starts_three),
+            takes[1] | (self._ready & ~starts),
         ]
         with m.If(advance):
             m.d.sync += [
@@ -187,56 +284,66 @@ class QuotientLanesUnit(QuotientSpansUnit):
                 m.d.sync += shown.eq(word if lane == 0 else Mux(self._both, word, 0))
             m.d.comb += Value.cast(result).eq(shown)
 
-        def both(value: Value, gap: Value, results: Any, name: str) -> None:
-            """Show a word of both lanes. The gap of a pair is the word of its second pixel."""
+        def accumulate(begin: Value, step: Value, gap: Value, results: Any, name: str) -> None:
+            """Accumulate a word, and show it in both lanes."""
+            value, base = (Signal.like(begin, name=word, reset_less=True) for word in (name, f"{name}_base"))
+            with m.If(advance):
+                m.d.sync += [word.eq(Mux(takes_start, begin, value + step)) for word in (value, base)]
+                # The word of the second lane is its base and the gap. The gap of a pair is the whole word.
+                with m.If(takes_start & self._starts_pair):
+                    m.d.sync += base.eq(0)
             show(0, value, results[0], name)
-            base = value & (~is_pair).replicate(len(value))
             show(1, (base + gap)[: len(value)], results[1], name)
 
         with m.If(advance & takes_start):
             m.d.sync += is_pair.eq(self._starts_pair)
+        # On the cycle after first differences were taken, the gap of their first beat is made.
+        loads = Signal(name="loads")
+        with m.If(advance):
+            m.d.sync += loads.eq(takes_first)
         for number in range(len(p.squares)):
             width, free = p.square_format.width, p.square_format.fraction_bits - 34
-            names = ("square", "step", "change", "next_gap", "gap", "gap_change")
-            value, step, change, next_gap, gap, gap_change = (
-                Signal(width, name=f"{name}_{number}", reset_less=True) for name in names
+            change, whole, gap, gap_change = (
+                Signal(width, name=f"{name}_{number}", reset_less=True)
+                for name in ("change", "whole", "gap", "gap_change")
             )
+            # The step has a bit more, because the gap is made from its half.
+            step = Signal(width + 1, name=f"step_{number}", reset_less=True)
             low = Signal(name=f"low_{number}", reset_less=True)
-            given, whole = second.squares[number], Cat(low, change)[:width]
+            given, doubled = second.squares[number], Cat(low, change)[:width]
             with m.If(advance):
+                # Second differences of a later span may wait in ``change`` while a pair takes its words.
+                with m.If(takes_first & ~self._marks[0]):
+                    m.d.sync += whole.eq(doubled)
                 with m.If(takes_second):
-                    m.d.sync += [change.eq(given[1:]), low.eq(given[0])]
+                    m.d.sync += [change.eq(given[1:]), low.eq(given[0]), whole.eq(0)]
                 with m.Elif(halves):
-                    m.d.sync += change.eq(whole)
-                with m.If(halves):
-                    m.d.sync += gap_change.eq(whole)
-                half = change & (~self._marks[0]).replicate(width)
-                with m.If(takes_first):
-                    m.d.sync += next_gap.eq(first.squares[number] + half)
-                begin = Cat(Const(0, free), start.payload.squares[number])
-                m.d.sync += [
-                    value.eq(Mux(takes_start, begin, value + step)),
-                    gap.eq(Mux(takes_start, next_gap, gap + (gap_change << 1))),
-                ]
-            with m.If(steps):
-                twice = (first.squares[number] << 1)[:width]
+                    m.d.sync += change.eq(doubled)
+                with m.If(takes_first | halves):
+                    m.d.sync += gap_change.eq(change + whole + (low & halves))
+                with m.If(takes_first & self._marks[0]):
+                    m.d.sync += gap_change.eq(0)
+                with m.If(loads | ~self._ready):
+                    m.d.sync += gap.eq(step[1:] + gap_change)
+            with m.If(steps | (advance & takes_first)):
+                twice = first.squares[number] << 1
                 m.d.sync += step.eq(Mux(takes_first, twice, step + Cat(low & halves, Const(0, 1), change)))
             of_light = p.highlights and number < p.lights
             results = [lane.numerator[number] if of_light else lane.rest for lane in lanes]
-            both(value, gap, results, f"square_{number}")
+            begin = Cat(Const(0, free), start.payload.squares[number])
+            accumulate(begin, step[:width], gap, results, f"square_{number}")
         for light in range(p.lights):
-            line, step, next_step = (
+            step, next_step = (
                 Signal(signed(p.LINE_FORMAT.width), name=f"{name}_{light}", reset_less=True)
-                for name in ("line", "line_step", "next_line_step")
+                for name in ("line_step", "next_line_step")
             )
             begin = Cat(Const(0, p.LINE_FORMAT.fraction_bits - 34), start.payload.lines[light]).as_signed()
             with m.If(advance):
-                m.d.sync += line.eq(Mux(takes_start, begin, line + (step << 1)))
                 with m.If(takes_first):
                     m.d.sync += next_step.eq(first.lines[light])
                 with m.If(takes_start):
                     m.d.sync += step.eq(next_step)
-            both(line, step, [lane.line[light] for lane in lanes], f"line_{light}")
+            accumulate(begin, step << 1, step, [lane.line[light] for lane in lanes], f"line_{light}")
             if p.takes_heights:
                 given = second.lines[light], start.payload.heights[light]
                 heights = self._heights(m, light, advance, takes, given, is_pair)

@@ -21,6 +21,8 @@ __all__ = ["QuotientSpansUnit", "line_directions_shape", "vectors_shape"]
 def vectors_shape(model: QuotientSpans, length_bits: int = LENGTH_BITS) -> data.StructLayout:
     """Shape of a span: components at the first pixel, their step, the step's exponent, and the length.
 
+    If the model's spans bring lines, ``line`` and ``line_step`` follow: l of each light, see `SpanVectors`.
+
     Parameters
     ----------
     model : QuotientSpans
@@ -30,9 +32,11 @@ def vectors_shape(model: QuotientSpans, length_bits: int = LENGTH_BITS) -> data.
     """
     vector = data.ArrayLayout(FixedShape(model.COMPONENT_FORMAT), len(model.components))
     exponent = unsigned(model.EXPONENT_FORMAT.width)
-    return data.StructLayout(
-        {"start": vector, "step": vector, "exponent": exponent, "length": unsigned(length_bits)}
-    )
+    members = {"start": vector, "step": vector, "exponent": exponent, "length": unsigned(length_bits)}
+    if model.brings_lines:
+        line = data.ArrayLayout(FixedShape(model.EXACT_LINE_FORMAT), model.lights)
+        members |= {"line": line, "line_step": line}
+    return data.StructLayout(members)
 
 
 def line_directions_shape(model: QuotientSpans) -> data.ArrayLayout:
@@ -92,6 +96,9 @@ class QuotientSpansUnit(SerialSetup, wiring.Component):
     DEPTH = 16
     """Largest number of waiting starts."""
 
+    _registers = 2
+    """Kinds of differences that wait in registers."""
+
     _SUMS, _SHIFTED = 3, 5
     """Stages of the sums, and of the shifted differences."""
 
@@ -108,7 +115,7 @@ class QuotientSpansUnit(SerialSetup, wiring.Component):
             "o": Out(stream.Signature(self._output_shape())),
             "begun": Out(1),
         }
-        if p.highlights:
+        if p.highlights and not p.brings_lines:
             members["constants"] = In(line_directions_shape(p))
         super().__init__(members)
 
@@ -149,7 +156,7 @@ class QuotientSpansUnit(SerialSetup, wiring.Component):
         ]
         m.d.comb += start.ready.eq(advance & takes_start)
         taken = advance & takes_second, advance & takes_first, start.ready
-        for waits, is_taken in zip((second_waits, first_waits), taken, strict=False):
+        for waits, is_taken in list(zip((second_waits, first_waits), taken, strict=False))[: self._registers]:
             with m.If(is_taken):
                 m.d.sync += waits.eq(0)
         if self.serial:
@@ -160,7 +167,7 @@ class QuotientSpansUnit(SerialSetup, wiring.Component):
         # On the cycle after the first difference was taken, half of the second difference is added.
         halves, ready = Signal(name="halves"), self._ready
         with m.If(advance):
-            m.d.sync += halves.eq(takes_first)
+            m.d.sync += halves.eq(self._halved(takes_first))
         steps = advance & (halves | ~ready)
         self._accumulate(m, (advance, halves, steps), takes, (second, first), start)
         return m
@@ -239,9 +246,6 @@ class QuotientSpansUnit(SerialSetup, wiring.Component):
         # drives the multiplexers of all operands.
         begun, is_second, ends = (Signal(name=name) for name in ("has_begun", "is_second", "ends"))
         valid, is_long = self.i.valid, span.length[1:].any()
-        paired, has_second = self._turn_of_a_pair(m, moves, begun, is_second), is_long
-        if paired is not None:
-            has_second = is_long & ~self._is_pair(span.length)
         m.d.comb += [
             ends.eq(Mux(begun, ~is_second, ~is_long)),
             self.i.ready.eq(moves & ends),
@@ -251,23 +255,10 @@ class QuotientSpansUnit(SerialSetup, wiring.Component):
         with m.If(moves):
             m.d.sync += [
                 begun.eq(Mux(begun, is_second | ~valid, valid & is_long)),
-                is_second.eq(Mux(begun, is_second & ~valid, valid & has_second)),
+                is_second.eq(Mux(begun, is_second & ~valid, valid & is_long)),
             ]
 
-        def register(value, name):
-            result = Signal(Value.cast(value).shape(), name=name, reset_less=True)
-            with m.If(moves):
-                m.d.sync += result.eq(value)
-            return result
-
-        def delayed(value, name, last, first=1):
-            for stage in range(first, last + 1):
-                value = register(value, f"{name}_{stage}")
-            return value
-
-        def product(a, b, name):
-            return register(register(a, f"{name}_a") * register(b, f"{name}_b"), name)
-
+        register, delayed, product = self._stages(m, moves)
         # For each stage three signals tell the kind of its word: second difference, first difference, start.
         here = [[self.i.valid & turn for turn in (is_second, begun & ~is_second, ~begun)]]
         for stage in range(1, self._SHIFTED):
@@ -279,8 +270,7 @@ class QuotientSpansUnit(SerialSetup, wiring.Component):
         begin, step = (
             {name: vector[at].as_value() for name, at in place.items()} for vector in (span.start, span.step)
         )
-        of_step = is_second if paired is None else is_second | paired
-        a = {name: Mux(of_step, step[name], begin[name]) for name in place}
+        a = {name: Mux(is_second, step[name], begin[name]) for name in place}
         b = {name: Mux(begun, step[name], begin[name]) for name in place}
         squares = []
         for number, names in enumerate(p.squares):
@@ -293,7 +283,7 @@ class QuotientSpansUnit(SerialSetup, wiring.Component):
         to_start = stream.Signature(payload.shape()).create(path=("to_start",))
         m.d.comb += [
             to_start.valid.eq(here[self._SUMS][2] & moves),
-            to_start.payload.length.eq(delayed(self._counted(span.length), "length", self._SUMS)),
+            to_start.payload.length.eq(delayed(span.length, "length", self._SUMS)),
         ]
         for total, word in zip(
             (*squares, *lines), (*to_start.payload.squares, *to_start.payload.lines), strict=True
@@ -311,22 +301,40 @@ class QuotientSpansUnit(SerialSetup, wiring.Component):
         at_sums, at_coarse = here[self._SUMS], here[self._SUMS + 1]
         before = delayed(span.exponent, "exponent", self._SUMS - 1)
         amounts = before, Mux(here[self._SUMS - 1][0], Cat(Const(0, 1), before), before)[:5]
-        if paired is not None:
-            amounts = self._amounts(m, moves & at_coarse[1], delayed, paired, b, amounts)
         exponent = register(amounts[0], f"exponent_{self._SUMS}")
         amount = register(amounts[1], "amount")
         shifted = self._shifted(register, (squares, amount), (lines, exponent))
         # Second differences wait until both differences of the span before are taken.
-        arrives = at_coarse[0]
-        if paired is not None:
-            # A pair has first differences alone.
-            arrives |= at_coarse[1]
-        m.d.comb += moves.eq(~((arrives & first[1]) | (at_sums[2] & ~to_start.ready)))
+        m.d.comb += moves.eq(~((at_coarse[0] & first[1]) | (at_sums[2] & ~to_start.ready)))
         for which, (word, waits) in enumerate((second, first)):
             with m.If(moves & at_coarse[which]):
                 m.d.sync += waits.eq(1)
                 for target, value in zip((*word.squares, *word.lines), shifted, strict=True):
                     m.d.sync += target.eq(value[: len(target)])
+
+    @staticmethod
+    def _stages(m: Module, moves: Value) -> tuple[Callable, Callable, Callable]:
+        """Functions that make a register, a chain of registers, and a product in registers."""
+
+        def register(value, name):
+            result = Signal(Value.cast(value).shape(), name=name, reset_less=True)
+            with m.If(moves):
+                m.d.sync += result.eq(value)
+            return result
+
+        def delayed(value, name, last, first=1):
+            for stage in range(first, last + 1):
+                value = register(value, f"{name}_{stage}")
+            return value
+
+        def product(a, b, name):
+            return register(register(a, f"{name}_a") * register(b, f"{name}_b"), name)
+
+        return register, delayed, product
+
+    def _halved(self, takes_first: Value) -> Value:
+        """Whether half of a second difference is added on the next cycle."""
+        return takes_first
 
     def _shifted(self, register: Callable, squares: Any, lines: Any) -> list[Value]:
         """Differences from sums of products and their shifts."""
@@ -336,13 +344,6 @@ class QuotientSpansUnit(SerialSetup, wiring.Component):
             *(self._shift(register, total, left, amount, f"square_{k}") for k, total in enumerate(squares)),
             *(self._shift(register, total, more, exponent, f"line_{k}") for k, total in enumerate(lines)),
         ]
-
-    def _turn_of_a_pair(self, m: Module, moves: Value, begun: Value, is_second: Value) -> Value | None:
-        """Whether the turn is the second turn of a pair, see `QuotientLanesUnit`. ``None``: no pairs."""
-
-    def _counted(self, length: Value) -> Value:
-        """Number from which the pixels of a span are counted."""
-        return length
 
     @staticmethod
     def _few_of(length: Value) -> Value:

@@ -29,7 +29,8 @@ class QuotientInterpolatorUnit(InterpolatorUnit, model=QuotientInterpolator):
     range.
 
     With two lanes `QuotientLanesUnit` gives the words of two pixels. Each lane has a `QuotientUnit`. Both
-    have the same handshakes, so they are in the same state on every cycle.
+    have the same handshakes, so they are in the same state on every cycle. Spans bring their lines, so the
+    constants are not read.
 
     Parameters
     ----------
@@ -49,14 +50,18 @@ class QuotientInterpolatorUnit(InterpolatorUnit, model=QuotientInterpolator):
     """
 
     @classmethod
-    def span_shape(cls, lights, *, highlights=True, length_bits=LENGTH_BITS, mirror=False):
-        """Shape of a span: vectors in the frames of the lights, their steps, and the length."""
-        return vectors_shape(QuotientSpans(lights, highlights, mirror and highlights), length_bits)
+    def span_shape(cls, lights, *, highlights=True, length_bits=LENGTH_BITS, mirror=False, pairs=False):
+        """Shape of a span: vectors in the frames of the lights, their steps, and the length.
+
+        For several lanes (``pairs``) with highlights, lines follow.
+        """
+        model = QuotientLanes if pairs else QuotientSpans
+        return vectors_shape(model(lights, highlights, mirror and highlights), length_bits)
 
     @classmethod
     def span_options(cls, model):
-        """Whether highlights are those of R·V, for which the span's y is multiplied by cos a."""
-        return {"mirror": model.mirror}
+        """Whether highlights are those of R·V, for which y is times cos a, and whether spans may be pairs."""
+        return {"mirror": model.mirror, "pairs": model.pairs}
 
     room_after = 0
 
@@ -67,7 +72,7 @@ class QuotientInterpolatorUnit(InterpolatorUnit, model=QuotientInterpolator):
 
     def span_intervals(self, spans):
         """Intervals of the spans. They are shorter for spans of one or two pixels."""
-        return np.minimum(spans.length, 3) * self.setup_interval // 3
+        return np.maximum(np.minimum(spans.length, 3) * self.setup_interval // 3, 1)
 
     @property
     def has_begun(self):
@@ -107,7 +112,7 @@ class QuotientInterpolatorUnit(InterpolatorUnit, model=QuotientInterpolator):
             self.i.ready.eq(spans.i.ready),
             self.begun.eq(spans.begun),
         ]
-        if self.highlights:
+        if self.highlights and self.lanes == 1:
             for given, light in zip(spans.constants, self.constants, strict=True):
                 m.d.comb += [given[0].eq(light.direction[0]), given[1].eq(light.direction[2])]
         if self.lanes == 1:

@@ -188,7 +188,7 @@ class FrameSimulator:
     ) -> tuple[Run, np.ndarray]:
         """A simulation, and its pixels in the order of the spans. ``y`` has the pixels' scanlines."""
         # The number of wide beats depends on the number of pixels that leave on each cycle.
-        spans = self.design.interpolator.sent(spans)
+        spans = self.design.sent(spans, constants)
         beats = int((-(-np.asarray(spans.length) // self._lanes)).sum())
         ends = {"count": beats} if self._pipes == 1 else {"count": None, "idle_timeout": _IDLE}
         run = simulate(

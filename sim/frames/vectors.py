@@ -140,7 +140,7 @@ def teapot_frame(
     spans = prepared.spans
     spans = spans[np.r_[0, : len(spans)]]
     spans.length[0] = 0
-    spans = design.interpolator.sent(spans)
+    spans = design.sent(spans, prepared.constants)
     return spans, prepared.constants, design.compute(spans, prepared.constants)
 
 

@@ -78,9 +78,14 @@ def _expect(unit, case):
 
 
 def vector_case(unit, vectors, length, constants):
-    """Spans of vectors for a unit, and the directions of its lights if it has highlights."""
-    beats = {**vectors._asdict(), "length": length}
-    return Case(beats, constants if unit.model.highlights else None)
+    """Spans of vectors for a unit, and the directions of its lights if it has highlights.
+
+    If spans bring their lines, these are computed from the directions, and the unit has no constants.
+    """
+    if unit.model.brings_lines:
+        vectors, constants = unit.model.with_lines(vectors, constants), None
+    beats = {name: codes for name, codes in vectors._asdict().items() if codes is not None}
+    return Case({**beats, "length": length}, constants if unit.model.highlights else None)
 
 
 def _spans(unit, rng, count):

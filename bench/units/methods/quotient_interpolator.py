@@ -55,7 +55,8 @@ def _spans(unit, rng, count):
     vectors = any_span_vectors(rng, unit.model, unit.lights, unit.highlights, length)
     directions = np.insert(line_directions(rng, unit.lights), 1, 0, axis=1)
     constants = light_constants(unit, directions, np.zeros_like(directions))
-    return Case({**vectors._asdict(), "length": length}, constants)
+    beats = {name: getattr(vectors, name) for name in ("start", "step", "exponent")}
+    return Case({**beats, "length": length}, constants)
 
 
 RECORD = Record(
