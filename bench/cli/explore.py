@@ -7,7 +7,7 @@ import click
 
 from blysk.bench.tools.defaults import EXPONENT, SIZE
 from blysk.bench.tools.sweep import COSTS, DEGREES, OPERANDS, SERVED, WORDS, Sweep
-from blysk.golden.build import STYLES
+from blysk.golden.build import LANES, STYLES
 from blysk.golden.lighting.intensity import MAX_LIGHTS
 from blysk.golden.lighting.specular import MAX_EXPONENT
 from blysk.golden.presets import METHODS, PUBLISHED
@@ -123,6 +123,7 @@ _USUAL = Sweep()
     "Fraction bits of the differences of chord-local: even numbers from 36 to 46.",
 )
 @_option("--styles", STYLES, _USUAL.styles, "One pixel a cycle, or few multipliers.")
+@_option("--lanes", LANES, _USUAL.lanes, "Numbers of lanes of quotient in the throughput style.")
 @click.option(
     "--limit", type=Whole(1, 1000), default=10, show_default=True, help="Number of designs to list."
 )

@@ -43,7 +43,7 @@ def _lit(scene: Scene, lights: int) -> Scene:
 
 
 def errors_of(candidate: Mapping[str, Any], view: Mapping[str, Any], exponent: int) -> dict[str, Any]:
-    """Errors of a frame by a design's bit-accurate model. They do not depend on the style.
+    """Errors of a frame by a design's bit-accurate model. They do not depend on style and lanes.
 
     Parameters
     ----------
@@ -85,11 +85,11 @@ def costs_of(candidate: Mapping[str, Any]) -> dict[str, int]:
 
 
 def tasks_of(candidates: Iterable[Candidate], view: Mapping[str, Any], exponent: int) -> list[Task]:
-    """Measurements of designs on a scene. The errors of a design are one task for both styles."""
+    """Measurements of designs on a scene. The errors of a design are a task for all styles and lanes."""
     found = []
     for candidate in candidates:
         found.append(Task(costs_of, {"candidate": asdict(candidate)}))
-        common = asdict(replace(candidate, style="throughput"))
+        common = asdict(replace(candidate, style="throughput", lanes=1))
         found.append(Task(errors_of, {"candidate": common, "view": view, "exponent": exponent}))
     return list({(task.function, repr(task.settings)): task for task in found}.values())
 
@@ -108,9 +108,10 @@ class Explored:
         Figures of `Cost.totals`.
     cycles_per_pixel : float or None
         Upper bound from the figures of the units: the sum of ``max(cycles_per_pixel length, setup_interval)``
-        of all spans, divided by the number of pixels. Writes of constants and latency are not included. A
-        frame takes fewer cycles if a span is set up during the pixels of a longer span, or if pixels lack
-        terms. ``None`` for ``bisection``, because it states no interval of the spans that it divides.
+        of all spans, divided by the number of pixels. With lanes, beats take the place of pixels. Writes of
+        constants and latency are not included. A frame takes fewer cycles if a span is set up during the
+        pixels of a longer span, or if pixels lack terms. ``None`` for ``bisection``, because it states no
+        interval of the spans that it divides.
     out_of_range_spans : int
         Number of spans that are too wide, of `errors_of`.
     """
@@ -137,9 +138,10 @@ def explored(tasks: Sequence[Task], results: Sequence[Any]) -> list[Explored]:
     for (function, candidate), result in measured.items():
         if function is not costs_of:
             continue
-        frame = measured[errors_of, replace(candidate, style="throughput")]
+        frame = measured[errors_of, replace(candidate, style="throughput", lanes=1)]
         lengths, counts = np.array(frame["lengths"]).T
-        cycles = np.maximum(result["cycles_per_pixel"] * lengths, result["setup_interval"])
+        beats = -(-lengths // candidate.lanes)
+        cycles = np.maximum(result["cycles_per_pixel"] * beats, result["setup_interval"])
         divides = candidate.design.interpolator.divides_spans
         found.append(
             Explored(

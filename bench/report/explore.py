@@ -33,7 +33,7 @@ __all__ = ["explore"]
 
 _TRIANGLES = 10_000
 
-_CHOICES = ("method", "model", "lights", "operand", "degree", "fraction bits", "style")
+_CHOICES = ("method", "model", "lights", "operand", "degree", "fraction bits", "style", "lanes")
 
 
 def _choices(candidate: Candidate) -> tuple[str | int | None, ...]:

@@ -143,6 +143,7 @@ def frames(
     exponents: Sequence[int],
     simulated: bool,
     operand: Operand | None = None,
+    lanes: int = 1,
 ) -> list[dict[str, Any]]:
     """Frames of a design: their errors, cycles and pictures.
 
@@ -174,6 +175,8 @@ def frames(
         Whether the frames are simulated. Else the bit-accurate model computes the same frames.
     operand : str, optional
         Operand of the specular unit, if it is not the method's operand.
+    lanes : int
+        Lanes of the pipeline.
 
     Returns
     -------
@@ -188,7 +191,7 @@ def frames(
         - ``pixels``: shaded pixels, ``shown``: shown pixels, ``spans`` and ``out_of_range_spans``;
         - ``cycles``: ``None`` if not simulated, and ``modelled_cycles``: by `frame_cycles`.
     """
-    design = preset(method, model, operand=operand)
+    design = preset(method, model, operand=operand).built(lanes=lanes)
     simulator = FrameSimulator(design, "cxxrtl") if simulated else None
     results = []
     for scene in scenes_of(view, exponents):
@@ -197,6 +200,7 @@ def frames(
         writes = frame.prepared.writes
         names = {"method": method, "model": model, "engine": simulator.engine if simulator else "model"}
         names |= {"operand": operand} if operand else {}
+        names |= {"lanes": lanes} if lanes > 1 else {}
         results.append(
             {
                 "settings": {**_settings(view, scene), **names},
@@ -302,7 +306,7 @@ def _judged(
     }
 
 
-def hardware(method: str, model: str, operand: Operand | None = None) -> dict[str, int]:
+def hardware(method: str, model: str, operand: Operand | None = None, lanes: int = 1) -> dict[str, int]:
     """Resources of a design's pipeline before technology mapping, and its ``latency`` in cycles.
 
     Returns
@@ -310,7 +314,7 @@ def hardware(method: str, model: str, operand: Operand | None = None) -> dict[st
     dict
         See `Cost.totals`.
     """
-    unit = ShadingPipelineUnit(preset(method, model, operand=operand))
+    unit = ShadingPipelineUnit(preset(method, model, operand=operand).built(lanes=lanes))
     return cost_of(unit).totals | {"latency": unit.latency}
 
 
@@ -321,12 +325,13 @@ def speeds(
     exponents: Sequence[int],
     simulated: bool,
     operand: Operand | None = None,
+    lanes: int = 1,
 ) -> list[dict[str, float | None]]:
     """Run times of a design in software, the best of three.
 
     Parameters
     ----------
-    method, model, view, exponents, simulated, operand
+    method, model, view, exponents, simulated, operand, lanes
         As in `frames`.
 
     Returns
@@ -339,7 +344,7 @@ def speeds(
         - ``golden_ns_per_pixel``: nanoseconds a shown pixel to shade the same spans by the same method and
           model in float64 NumPy.
     """
-    design = preset(method, model, operand=operand)
+    design = preset(method, model, operand=operand).built(lanes=lanes)
     simulator = FrameSimulator(design, "cxxrtl") if simulated else None
     results = []
     for scene in scenes_of(view, exponents):

@@ -12,7 +12,16 @@ from blysk.bench.report.section import Conclusion, Drawing, Table
 from blysk.bench.svg import panels, svg
 from blysk.golden.presets import METHODS, MIRROR_LOBES
 
-__all__ = ["conclusion", "spread_table", "summaries"]
+__all__ = ["conclusion", "design_of", "spread_table", "summaries"]
+
+
+def design_of(settings: Mapping[str, Any]) -> tuple[str, ...]:
+    """Method and model of a point, the operand if it is not the method's own, and the lanes if several.
+
+    `blysk.sim.api.placed.design_of` has the same words.
+    """
+    lanes = (f"{settings['lanes']} pixel lanes",) if "lanes" in settings else ()
+    return *(settings[name] for name in ("method", "model", "operand") if name in settings), *lanes
 
 
 def summaries(
@@ -25,7 +34,7 @@ def summaries(
     points : sequence of dict
         Points of the report.
     spread : mapping
-        Results of `front_scenes.measure`, by method, model and the operand if it is not the method's own.
+        Results of `front_scenes.measure`, by `design_of`.
 
     Returns
     -------
@@ -48,8 +57,7 @@ def summaries(
         of["samples"].append((*errors, cycles, None))
     for of in found.values():
         settings = of["point"]["settings"]
-        key = tuple(settings[name] for name in ("method", "model", "operand") if name in settings)
-        for sample in spread.get(key, ()):
+        for sample in spread.get(design_of(settings), ()):
             cycles = sample["cycles"] / sample["pixels"]
             errors = [sample["method_max_lsb"], sample["total_max_lsb"]]
             of["samples"].append((*errors, cycles, sample["spans"] / max(sample["uncut_spans"], 1)))

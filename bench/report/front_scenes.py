@@ -38,7 +38,11 @@ def _mesh(name: str, triangles: int) -> Mesh:
 
 
 def measure(
-    method: str, model: str, scenes: Sequence[Sequence[Any]], operand: Operand | None = None
+    method: str,
+    model: str,
+    scenes: Sequence[Sequence[Any]],
+    operand: Operand | None = None,
+    lanes: int = 1,
 ) -> list[dict[str, Any]]:
     """Errors and cycles of a design over several scenes: by the bit-accurate model and the cycle model.
 
@@ -46,6 +50,8 @@ def measure(
     ----------
     method, model, operand
         Arguments of `preset`.
+    lanes : int
+        Lanes of the pipeline.
     scenes : sequence
         Scenes in the form of `QUICK_SCENES`.
 
@@ -56,7 +62,7 @@ def measure(
         ``method_max_lsb``, ``total_max_lsb``, ``spans`` after cutting, ``uncut_spans``, ``pixels``,
         ``cycles``.
     """
-    design = preset(method, model, operand=operand)
+    design = preset(method, model, operand=operand).built(lanes=lanes)
     unit = unit_of(design)
     found = []
     for mesh, triangles, size, exponents in scenes:

@@ -39,6 +39,7 @@ __all__ = [
     "BEST",
     "DESIGNS",
     "GROUPS",
+    "LANES",
     "QUICK_SIMULATED",
     "section",
     "tasks",
@@ -76,6 +77,9 @@ _BEST_OPERAND = {"operand": "one_minus_cosine"}
 
 _BEST_MODEL = "blinn"
 """A model with an exact table. Each method in its best form also has points with this model."""
+
+LANES = [{"method": "quotient", "model": "blinn", "lanes": 2}]
+"""Pipelines with several lanes, which have the errors of the same pipeline with one lane."""
 
 QUICK_SIMULATED = [(method, model_of(method)) for method in (*METHODS, *PUBLISHED)]
 QUICK_SIMULATED += [("quotient", "phong")]
@@ -118,7 +122,8 @@ def tasks(quick: bool, meshes: Sequence[str] = ()) -> list[Task]:
         where = {"view": view, "exponents": exponents}
         for design in _designs():
             pair = design["method"], design["model"]
-            simulated = compiles and (not quick or (pair in QUICK_SIMULATED and "operand" not in design))
+            usual = pair in QUICK_SIMULATED and len(design) == len(pair)
+            simulated = compiles and (not quick or usual)
             settings = {**design, **where, "simulated": simulated}
             found += [Task(frames, settings), Task(speeds, settings, timed=True)]
         for shading in SHADINGS:
@@ -130,24 +135,19 @@ def tasks(quick: bool, meshes: Sequence[str] = ()) -> list[Task]:
         if design["model"] in _SPREAD_MODELS:
             scenes = front_scenes.QUICK_SCENES if quick else front_scenes.FULL_SCENES
             found.append(Task(front_scenes.measure, {**design, "scenes": json.loads(json.dumps(scenes))}))
-        if not quick and "operand" not in design and all(tool_versions().values()):
+        if not quick and len(design) == len(pair) and all(tool_versions().values()):
             found.append(place_and_route.task(*pair))
     return found
 
 
-def _designs() -> list[dict[str, str]]:
+def _designs() -> list[dict[str, Any]]:
     """Options of the hardware's points."""
-    designs = [{"method": method, "model": model} for method, model in DESIGNS]
+    designs: list[dict[str, Any]] = [{"method": method, "model": model} for method, model in DESIGNS]
     designs += [{"method": method, "model": "cosquad"} | _BEST_OPERAND for method in BEST]
     best = [
         {"method": method, "model": _BEST_MODEL} for method in METHODS if (method, _BEST_MODEL) not in DESIGNS
     ]
-    return designs + [of | (_BEST_OPERAND if of["method"] in BEST else {}) for of in best]
-
-
-def _design_of(settings: Mapping[str, Any]) -> tuple[str, ...]:
-    """Method, model, and the operand if it is not the method's own."""
-    return tuple(settings[name] for name in ("method", "model", "operand") if name in settings)
+    return [*designs, *(of | (_BEST_OPERAND if of["method"] in BEST else {}) for of in best), *LANES]
 
 
 def _group(method: str) -> str:
@@ -169,7 +169,8 @@ def _command(settings: Mapping[str, Any]) -> str:
     words = ["blysk", "render", settings["source"]]
     if settings["triangles"] is not None:
         words += ["--triangles", str(settings["triangles"])]
-    words += ["--operand", settings["operand"]] if "operand" in settings else []
+    for name in ("operand", "lanes"):
+        words += [f"--{name}", str(settings[name])] if name in settings else []
     for name in ("method", "model", "exponent", "ambient", "diffuse", "specular"):
         words += [f"--{name}", str(settings[name])]
     words += ["--size", f"{settings['width']}x{settings['height']}"]
@@ -194,7 +195,7 @@ def _points(tasks: Sequence[Task], results: Sequence[Any]) -> list[dict[str, Any
             settings = found["settings"]
             method = settings["method"]
             software = task.function is software_frames
-            taken = {} if software else of_design.get(_design_of(settings), {})
+            taken = {} if software else of_design.get(front.design_of(settings), {})
             fmax = taken.get("fmax_mhz")
             cycles = None if software else cycles_of(key, found)
             points.append(
@@ -249,7 +250,7 @@ def _of_designs(tasks: Sequence[Task], results: Sequence[Any]) -> dict[tuple, di
         rates = {"fmax_mhz": entry["fmax_median_mhz"], "seeds_mhz": entry["fmax_mhz"]}
         found[design] = {"luts": entry["luts"], **rates, "placed": f"{entry['date']}, {entry['device']}"}
     for task, result in zip(tasks, results, strict=True):
-        of = found.setdefault(_design_of(task.settings), {}) if "method" in task.settings else {}
+        of = found.setdefault(front.design_of(task.settings), {}) if "method" in task.settings else {}
         if task.function is hardware:
             of |= result
         elif task.function is place_and_route.measure and "fmax_median_mhz" in result:
@@ -269,12 +270,18 @@ class _Cycles:
             if task.function is frames:
                 for key, found in zip(_keys(task), result, strict=True):
                     if found["cycles"] is not None:
-                        self._simulated.setdefault((*key[:2], key[-1]), (_design_of(task.settings), found))
+                        design = front.design_of(task.settings)
+                        self._simulated.setdefault(self._alike(key, found), (design, found))
+
+    @staticmethod
+    def _alike(key: tuple, found: Mapping[str, Any]) -> tuple:
+        """What frames have in common whose cycles differ by the latency alone."""
+        return *key[:2], found["settings"].get("lanes", 1), key[-1]
 
     def __call__(self, key: tuple, found: Mapping[str, Any]) -> float | None:
         if found["cycles"] is not None:
             return found["cycles"] / found["pixels"]
-        other, simulated = self._simulated.get((*key[:2], key[-1]), (None, None))
+        other, simulated = self._simulated.get(self._alike(key, found), (None, None))
         latency, others = (self._of_design.get(of, {}).get("latency") for of in (key[1:-1], other))
         same = simulated and all(simulated[name] == found[name] for name in ("spans", "pixels"))
         if None in (latency, others) or not same:
@@ -285,13 +292,14 @@ class _Cycles:
 
 def _label(settings: Mapping[str, Any]) -> str:
     """Name of a hardware design."""
-    return f"{settings['method']}, {settings['model']}" + ", 1 - N.H" * ("operand" in settings)
+    lanes = f", {settings['lanes']} lanes" if "lanes" in settings else ""
+    return f"{settings['method']}, {settings['model']}" + ", 1 - N.H" * ("operand" in settings) + lanes
 
 
 def _keys(task: Task) -> list[tuple]:
     """Keys of a task's points: mesh, design and exponent."""
     settings = task.settings
-    design = (settings["shading"],) if "shading" in settings else _design_of(settings)
+    design = (settings["shading"],) if "shading" in settings else front.design_of(settings)
     return [(settings["view"]["source"], *design, exponent) for exponent in settings["exponents"]]
 
 
@@ -304,8 +312,9 @@ def section(tasks: Sequence[Task], results: Sequence[Any]) -> Section:
 
       - ``id``, ``label``: texts; ``group``: a key of ``groups``;
       - ``settings``: all settings of the frame, such as ``source`` (the mesh), ``exponent``, ``method``,
-        ``model``, ``width``, ``height``, ``operand`` if it is not the method's own, and ``engine``
-        (``cxxrtl``: simulated, ``model``: by the bit-accurate model, ``float64``: by the golden renderer);
+        ``model``, ``width``, ``height``, ``operand`` if it is not the method's own, ``lanes`` if there are
+        several, and ``engine`` (``cxxrtl``: simulated, ``model``: by the bit-accurate model, ``float64``: by
+        the golden renderer);
       - ``command``: a line for a shell that reproduces the point;
       - ``errors``, ``times``: value or ``None`` for each key of ``errors`` or ``times`` below;
       - ``verdicts``: whether both frames look identical, for each kind of error: ``total``, ``method``,
@@ -331,7 +340,7 @@ def section(tasks: Sequence[Task], results: Sequence[Any]) -> Section:
     points = _points(tasks, results)
     fronts = fronts_of(points)
     spread = {
-        _design_of(task.settings): result
+        front.design_of(task.settings): result
         for task, result in zip(tasks, results, strict=True)
         if task.function is front_scenes.measure
     }

@@ -8,7 +8,7 @@ from functools import cached_property
 from itertools import product
 from typing import TYPE_CHECKING, NamedTuple, get_args
 
-from blysk.golden.build import STYLES
+from blysk.golden.build import LANES, STYLES
 from blysk.golden.methods.interpolator import Operand
 from blysk.golden.pipeline import ShadingPipeline
 from blysk.golden.presets import LOBES, METHODS, MIRROR_LOBES, MODELS, PUBLISHED, preset
@@ -56,6 +56,8 @@ class Candidate:
         Fraction bits of the differences of ``chord-local``.
     style : str
         See `ShadingPipelineUnit`.
+    lanes : int
+        Lanes of the pipeline. Several lanes need the throughput style.
 
     Raises
     ------
@@ -70,6 +72,7 @@ class Candidate:
     degree: int | None = None
     fraction_bits: int | None = None
     style: str = "throughput"
+    lanes: int = 1
 
     def __post_init__(self):
         _ = self.design
@@ -85,7 +88,7 @@ class Candidate:
             interpolator = interpolator.with_words(self.fraction_bits)
         if self.degree is not None:
             interpolator = interpolator.with_degree(self.degree)
-        return replace(usual, interpolator=interpolator)
+        return replace(usual, interpolator=interpolator).built(lanes=self.lanes)
 
     def unit(self) -> "ShadingPipelineUnit":
         """The design's hardware."""
@@ -97,12 +100,13 @@ class Candidate:
     @property
     def command(self) -> str:
         """Shell command that prints the design as Verilog."""
-        usual = preset(self.method, self.model, operand=self.operand).interpolator
+        usual = preset(self.method, self.model, operand=self.operand).interpolator.for_lanes(self.lanes)
         if self.method in METHODS and self.design.interpolator == usual:
             words = ["blysk", "verilog", "--method", self.method, "--model", self.model]
             words += ["--lights", str(self.lights)] if self.lights != 1 else []
             words += ["--operand", self.operand] if self.operand else []
             words += ["--style", self.style] if self.style != "throughput" else []
+            words += ["--lanes", str(self.lanes)] if self.lanes > 1 else []
             return shlex.join([*words, "--transfer", self.design.transfer])
         given = {field.name: (getattr(self, field.name), field.default) for field in fields(self)}
         # JSON puts strings into double quotes. The shell's single quotes can then surround them.
@@ -116,8 +120,8 @@ class Sweep(NamedTuple):
 
     Parameters
     ----------
-    methods, models, lights, operands, degrees, fraction_bits, styles : sequences
-        See `Candidate`.
+    methods, models, lights, operands, degrees, fraction_bits, styles, lanes : sequences
+        See `Candidate`. Only the throughput style has several lanes.
     """
 
     methods: Sequence[str] = tuple(METHODS)
@@ -127,6 +131,7 @@ class Sweep(NamedTuple):
     degrees: Sequence[int] = (1, 2, 3)
     fraction_bits: Sequence[int] = (40, 46)
     styles: Sequence[str] = STYLES
+    lanes: Sequence[int] = LANES
 
     def candidates(self) -> tuple[list[Candidate], dict[str, int]]:
         """Every design once, and the number of impossible combinations for each reason."""
@@ -140,7 +145,10 @@ class Sweep(NamedTuple):
             operands = [None if operand == usual else operand for operand in self.operands]
             if usual not in OPERANDS:
                 operands = [None]
-            for values in product(self.models, self.lights, operands, degrees, words, self.styles):
+            lanes = self.lanes if of.serves_lanes else (1,)
+            built = [(s, n) for s, n in product(self.styles, lanes) if n == 1 or s == "throughput"]
+            for *choices, build in product(self.models, self.lights, operands, degrees, words, built):
+                values = *choices, *build
                 try:
                     found[Candidate(method, *values)] = None
                 except ValueError as error:

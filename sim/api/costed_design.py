@@ -2,9 +2,10 @@
 
 from dataclasses import dataclass, fields, replace
 from statistics import median
-from typing import Any
+from typing import Any, get_args
 
 from blysk.golden import pipeline
+from blysk.golden.methods.interpolator import Operand
 from blysk.golden.presets import preset
 from blysk.sim.api.placed import design_of, read_store
 
@@ -104,8 +105,9 @@ class Design(pipeline.ShadingPipeline):
             words = design_of(entry["design"])
             if words is None or words[:2] != (self.method, self.model):
                 continue
-            operand: Any = words[2] if len(words) > 2 else None
-            if preset(words[0], words[1], operand=operand) == shading:
+            operand: Any = next((word for word in words[2:] if word in get_args(Operand)), None)
+            lanes = next((int(word[0]) for word in words[2:] if word.endswith("lanes")), 1)
+            if preset(words[0], words[1], operand=operand).built(lanes=lanes) == shading:
                 return {
                     **{name: entry[name] for name in ("luts", "flip_flops", "block_rams", "device")},
                     "clock_mhz": median(entry["fmax_mhz"]),

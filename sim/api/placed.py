@@ -10,11 +10,13 @@ __all__ = ["STORE", "design_of", "read_store"]
 STORE = Path(__file__).with_name("placed.json")
 """The committed store: a list of entries of `blysk.bench.report.placed.merged`."""
 
-_NAME = re.compile(r"pipeline ([\w-]+), ([\w-]+), 1 light(?:, (cosine|one_minus_cosine))?")
+_NAME = re.compile(
+    r"pipeline ([\w-]+), ([\w-]+), 1 light(?:, (cosine|one_minus_cosine))?(?:, (\d pixel lanes))?"
+)
 
 
 def design_of(name: str) -> tuple[str, ...] | None:
-    """Method, model and, if the name has it, operand of a pipeline, from its name in ``blysk fpga``.
+    """Method, model, and if given operand and lanes, of a pipeline, from its name in ``blysk fpga``.
 
     ``None`` for several lights, another style, and names that do not belong to a pipeline.
     """

@@ -85,9 +85,11 @@ def test_impossible_candidates_are_refused(values):
 def test_quotient_is_swept_with_its_lobes():
     """quotient has its own operand, and no choice of words or degrees."""
     found, impossible = Sweep(methods=("quotient", "renormalise")).candidates()
-    quotients = [(one.model, one.style) for one in found if one.method == "quotient"]
-    assert quotients == [(model, style) for model in ("blinn", "phong") for style in STYLES]
-    assert impossible["quotient: serves only models that come from a table"] == 3 * len(STYLES)
+    quotients = [(one.model, one.style, one.lanes) for one in found if one.method == "quotient"]
+    builds = [("throughput", 1), ("throughput", 2), ("compact", 1)]
+    assert quotients == [(model, *build) for model in ("blinn", "phong") for build in builds]
+    assert {one.lanes for one in found if one.method == "renormalise"} == {1}
+    assert impossible["quotient: serves only models that come from a table"] == 3 * len(builds)
     assert any(reason.startswith("renormalise: phong is a lobe of R·V") for reason in impossible)
 
 
@@ -124,6 +126,7 @@ def test_every_method_is_in_the_default_sweep():
     [
         (Candidate("linear"), True),
         (Candidate("quotient", "phong"), True),
+        (Candidate("quotient", "phong", lanes=2), True),
         (Candidate("quadratic", "exp", 2, "one_minus_cosine", 3, style="compact"), True),
         (Candidate("chord-local", fraction_bits=46), True),
         (Candidate("chord-local", "cosquad7", 2, None, None, 40, "compact"), False),
@@ -149,7 +152,7 @@ def test_command_of_a_design_makes_it(candidate, is_plain, monkeypatch, capsys):
     unit = made.pop()
     assert unit.model.interpolator == candidate.design.interpolator
     assert (unit.model.model, unit.model.lights) == (candidate.model, candidate.lights)
-    assert unit.model.build.style == candidate.style
+    assert (unit.model.build.style, unit.model.build.lanes) == (candidate.style, candidate.lanes)
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", UnusedElaboratable)
         del unit

@@ -121,6 +121,7 @@ def test_quick_tasks():
     best = {(method, "one_minus_cosine") for method in METHODS if method != "quotient"}
     assert best | {("quotient", "place")} <= operands
     assert {(s["method"], s["model"]) for s in of_frames(chosen) if s["simulated"]} == set(QUICK_SIMULATED)
+    assert [s["method"] for s in of_frames(chosen) if s.get("lanes") == 2] == ["quotient"]
     assert {method for method, _ in QUICK_SIMULATED} == {*METHODS, *PUBLISHED}
     assert [one.settings["shading"] for one in chosen if one.function is software_frames] == [*SHADINGS]
     assert all(one.timed == (one.function in (speeds, software_speeds)) for one in chosen)
@@ -133,7 +134,7 @@ def test_full_tasks(monkeypatch):
     monkeypatch.setattr(points, "tool_versions", lambda: {"pyosys": "1"})
     chosen = tasks(quick=False)
     assert all(s["simulated"] and s["exponents"] == list(EXPONENTS) for s in of_frames(chosen))
-    placed = sum("operand" not in settings for settings in of_frames(chosen))
+    placed = sum(not {"operand", "lanes"} & {*settings} for settings in of_frames(chosen))
     assert sum(one.function is place_and_route.measure for one in chosen) == placed > len(DESIGNS)
     monkeypatch.setattr(points, "tool_versions", lambda: {"pyosys": None})
     assert sum(one.function is place_and_route.measure for one in tasks(quick=False)) == 0
