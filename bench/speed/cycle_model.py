@@ -85,8 +85,8 @@ def beat_cycles(length: np.ndarray, lanes: int) -> int:
     pixels or more have differences. Let p be the span with differences before span k, and f_p the cycle in
     which its first differences are taken.
 
-    - The last turn of span k is in ``g_k = t_k`` if it has one or two pixels. If it has more, the turn is in
-      ``g_k = max(t_k, f_p - 4) + 1``. Then ``t_(k+1) = g_k + 1``.
+    - The last turn of span k is in ``g_k = t_k`` if it has one or two pixels, else in ``g_k = t_k + 1``. Then
+      ``t_(k+1) = g_k + 1``.
     - ``f_k = max(g_k + 5, s_p + b_p - 1)``
     - ``s_k = max(s_(k-1) + b_(k-1), g_k + 5, f_k + 1)``
     - `QuotientLanesUnit.DEPTH` limits the starts that wait: ``t_k >= s_(k-14) - 1``.
@@ -104,7 +104,7 @@ def beat_cycles(length: np.ndarray, lanes: int) -> int:
     for pixels, beats in zip(length.tolist(), (-(-length // lanes)).tolist(), strict=True):
         if len(starts) >= waiting:
             turn = max(turn, starts[-waiting] - 1)
-        last = turn if pixels <= 2 else max(turn, taken - 4) + 1
+        last = turn + (pixels > 2)
         start = max(free, last + 5)
         if pixels > 1:
             taken = max(last + 5, room)

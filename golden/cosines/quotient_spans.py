@@ -45,7 +45,8 @@ class SpanVectors(NamedTuple):
         """Some of the spans, by a slice, indices or a mask; or a field, by its number."""
         if isinstance(which, int):
             return tuple.__getitem__(self, which)
-        return SpanVectors(*(None if field is None else field[which] for field in tuple(self)))
+        fields: Any = (None if field is None else field[which] for field in tuple(self))
+        return SpanVectors(*fields)
 
     @classmethod
     def quantise(cls, left: np.ndarray, right: np.ndarray, length: np.ndarray) -> "SpanVectors":

@@ -176,11 +176,6 @@ BUGS = {
         "",
     ),
     "the gap of the first beat is not made": ("_accumulate", "loads | ~self._ready", "~self._ready"),
-    "a pair disturbs second differences that wait": (
-        "_accumulate",
-        "takes_first & ~self._marks[0]",
-        "takes_first",
-    ),
 }
 
 
