@@ -272,7 +272,7 @@ SCENE_OF_ITS_OWN = blysk.scene(**TINY)
         ("teapot", {"lanes": 2, "pipes": 2}, "lanes 2: several pipelines give single pixels; leave out "),
         ("teapot", {"lanes": 2, "method": "linear"}, "lanes 2: method linear makes single pixels; take the "),
         ("teapot", {"lanes": 2, "style": "compact"}, "lanes 2: a pixel of the compact style takes several "),
-        ("teapot", {"lanes": 2, "geometry": "hardware"}, "lanes 2: the depth test takes single pixels; "),
+        ("teapot", {"lanes": 2, "geometry": "hardware"}, "geometry hardware: the depth test takes "),
         ("teapot", {"short_words": True}, "short_words: nothing is specialised; "),
         ("teapot", {"vcd": "a", "engine": "cxxrtl"}, "vcd: the engine cxxrtl writes no waveforms; "),
         ("no.toml", {}, "no.toml: there is no such file; "),
