@@ -181,11 +181,10 @@ _ORDERED = LOBE_ADDRESS, BANK_ADDRESS, TEXELS_ADDRESS, TEXEL_ADDRESS
 
 def case_of(unit, spans: Spans, constants, *before: int) -> Case:
     """Input of spans and constants of each material. First all constants get each of the codes ``before``."""
-    design, constants = unit.model, constants if isinstance(constants, list) else [constants]
-    write = writes_of(constants)
+    write = writes_of(constants := constants if isinstance(constants, list) else [constants])
     kept = np.isin(write["address"], _ORDERED)
     parts = [{"address": write["address"], "data": np.where(kept, write["data"], code)} for code in before]
-    spans = with_lines(design, ends_for(design, spans), constants)
+    spans = with_lines(unit.model, ends_for(unit.model, spans), constants)
     return Case(beats_of(unit, spans), write=together([*parts, write]))
 
 
@@ -326,16 +325,14 @@ def _frames(unit, rng, count):
             # This word of L is equal to the value that begins a table.
             constants[0].direction[:, 0] = -ONE
         write = [writes_of(constants)]
-        if design.loads_tables and rng.random() < 0.2:
-            write.append(_lost(rng, design))
+        write += [_lost(rng, design)] if design.loads_tables and rng.random() < 0.2 else []
         if writes and rng.random() < 0.6:
             write = [_disordered(rng, write[0], rng.choice([0.3, 1.0, 1.0]))]
         frames.append(with_lines(design, ends_for(design, frame), constants))
         writes.append(together(write))
         after.append(after[-1] + len(frame))
     places = np.repeat(after[:-1], [len(write["data"]) for write in writes])
-    beats = together([beats_of(unit, frame) for frame in frames])
-    return Case(beats, write=together(writes), write_after=places)
+    return Case(together([beats_of(unit, of) for of in frames]), write=together(writes), write_after=places)
 
 
 def _counters(unit, rng, count):
