@@ -2,10 +2,12 @@
 
 import json
 import shutil
+from collections.abc import Iterable
 from pathlib import Path
 from typing import Any
 
 import click
+from click.core import ParameterSource
 
 from blysk.bench.tools.board_options import COLOURS, DEFAULTS, OPTIONS
 from blysk.bench.tools.boards import board_named, packages_missing
@@ -55,11 +57,21 @@ _MOST_FRAMES = 60
 @click.option(
     "--seeds", type=Whole(1, 20), default=4, show_default=True, help="Largest number of placements to try."
 )
+@click.option(
+    "--from",
+    "routed",
+    metavar="FILE",
+    help="Bitstream of this command, of the same design. Only the words of its memories are rewritten, for "
+    "--mesh, materials, lights and motion. Nothing is placed or routed. With --simulate: simulate the words "
+    "of its memories.",
+)
 @click.option("--record", type=OutputFile(), help="JSON file to which the figures of this run are added.")
 @click.option("--load", is_flag=True, help="Load the bitstream with openFPGALoader.")
 @options_of(OPTIONS)
 @click.pass_context
-def command(context, board_name, mesh, output, simulate, colours, clock, toggles, seeds, record, load, **_):
+def command(
+    context, board_name, mesh, output, simulate, colours, clock, toggles, seeds, routed, record, load, **_
+):
     """Show a turning mesh on the monitor of BOARD: ulx3s-25f, ulx3s-85f or icepi-zero.
 
     Without --simulate the command makes a bitstream. It first prints results of earlier bitstreams for this
@@ -70,6 +82,9 @@ def command(context, board_name, mesh, output, simulate, colours, clock, toggles
     the frames with the bit-accurate model. The exit status is 1 if a frame differs, or if the frames are too
     heavy for 60 Hz.
 
+    With --from nothing is placed, and the command takes seconds. It refuses what would change more than the
+    words of memories.
+
     Vertex colours and textures are drawn if the board has room for them. If not, a warning says why.
 
     The buttons of the board stop the motion, reverse it, and change the material and the light.
@@ -77,6 +92,7 @@ def command(context, board_name, mesh, output, simulate, colours, clock, toggles
     \b
     Examples:
         blysk board ulx3s-25f --mesh teapot -o teapot.bit
+        blysk board ulx3s-25f --mesh new.glb --from teapot.bit -o new.bit
         blysk board ulx3s-85f --exponent 200 --simulate 2 -o frames/
     """
     board = board_named(board_name)
@@ -88,23 +104,33 @@ def command(context, board_name, mesh, output, simulate, colours, clock, toggles
         raise InputError("--toggles", "counts bits of a simulation", "also give --simulate N")
     if simulate and load:
         raise InputError("--load", "there is no bitstream of a simulation", "leave out --simulate or --load")
-    if not simulate:
+    if routed is not None:
+        _refuse_unused(context, () if simulate else ("seeds", "record"))
+    if routed is not None or not simulate:
         packages_missing()
+    if not simulate:
         from blysk.sim.cli.outputs import check_outputs
 
-        check_outputs([], pictures=[], others=[output, record])
+        check_outputs([routed] if routed else [], pictures=[], others=[output, record])
     recorded = _recorded(record)
     settings = read_settings(mesh, given, {**SCENE, **DESIGN}, **DEFAULTS)
     check_mesh(settings)
     from blysk.bench.tools import board as work
+    from blysk.bench.tools.board_from import RoutedBitstream
 
-    gpu, scenes, plan = work.planned(board, mesh, given, colours, clock)
+    source = None if routed is None else RoutedBitstream.read(routed)
+    gpu, scenes, plan = work.planned(board, mesh, given, colours, clock, source)
     click.echo("\n".join(work.design_lines(board, mesh, gpu, plan)))
+    if source is not None and not simulate:
+        work.write_rewritten(work.rewritten_from(source, board, gpu, plan), output)
+        if load:
+            work.load_bitstream(loader, board, output)
+        return
     if not simulate:
         click.echo(f"{'bitstream':<12}known: {board.known}")
     figures = recorded.setdefault(f"{board.name}, {mesh}, {gpu.drawing.mesh.triangles:,} triangles", {})
     if simulate:
-        figures["simulated"] = work.simulated(board, gpu, scenes, plan, simulate, Path(output))
+        figures["simulated"] = work.simulated(board, gpu, scenes, plan, simulate, Path(output), source)
         if toggles:
             figures["toggles"] = work.toggled(board, gpu, plan, simulate)
         if record:
@@ -118,6 +144,21 @@ def command(context, board_name, mesh, output, simulate, colours, clock, toggles
     work.write_bitstream(built, output)
     if load:
         work.load_bitstream(loader, board, output)
+
+
+def _refuse_unused(context: click.Context, names: Iterable[str]) -> None:
+    """Refuse options that a run with --from would not read.
+
+    Raises
+    ------
+    InputError
+        If one of these options is given.
+    """
+    if context.params["toggles"]:
+        raise InputError("--toggles", "counts bits of the mesh itself", "leave out --from or --toggles")
+    for name in names:
+        if context.get_parameter_source(name) is not ParameterSource.DEFAULT:
+            raise InputError(f"--{name}", "nothing is placed with --from", f"leave out --{name}")
 
 
 def _recorded(path: str | None) -> dict[str, Any]:

@@ -8,7 +8,8 @@ decoded as in a monitor, and the frames are compared with the frames of the bit-
 """
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import asdict
+from contextlib import AbstractContextManager, nullcontext
+from dataclasses import asdict, replace
 from fractions import Fraction
 from pathlib import Path
 from time import perf_counter
@@ -17,8 +18,9 @@ from typing import Any
 import click
 import numpy as np
 
-from blysk.bench.tools.board_build import Built, build
+from blysk.bench.tools.board_build import BoardNetlist, Built, build
 from blysk.bench.tools.board_design import BoardTop, gpu_of, least_cycles
+from blysk.bench.tools.board_from import Rewritten, RoutedBitstream, changed_lines, rewrite
 from blysk.bench.tools.boards import Board
 from blysk.bench.tools.tool_runner import ToolError
 from blysk.golden.albedo.albedo import Albedo
@@ -29,6 +31,7 @@ from blysk.golden.reference.scene import Scene
 from blysk.golden.reference.transfer import SPACES
 from blysk.golden.video.clock_plan import ClockPlan, NoClockPlan, clock_plan
 from blysk.golden.video.draw_unit import turned
+from blysk.hdl.core.scene_memory import contents_from
 from blysk.hdl.emit.processes import run_program
 from blysk.hdl.gpu import GpuUnit
 from blysk.sim.cli.progress import progress, steps
@@ -48,16 +51,23 @@ __all__ = [
     "load_bitstream",
     "missed",
     "planned",
+    "rewritten_from",
     "shown_lines",
     "simulated",
     "toggled",
     "too_heavy",
     "write_bitstream",
+    "write_rewritten",
 ]
 
 
 def planned(
-    board: Board, mesh: str, given: Mapping[str, Any], colours: str | None, clock: float
+    board: Board,
+    mesh: str,
+    given: Mapping[str, Any],
+    colours: str | None,
+    clock: float,
+    source: RoutedBitstream | None = None,
 ) -> tuple[Gpu, list[Scene], ClockPlan]:
     """The drawing of a mesh on a board, the scenes of its presets, and its clocks.
 
@@ -67,11 +77,15 @@ def planned(
         As in `gpu_of`.
     clock : float
         Rate of the drawing clock, MHz.
+    source : RoutedBitstream, optional
+        Bitstream of the same design, whose memories the drawing must fit. By default memories have room for
+        as many words as their block RAMs hold.
 
     Raises
     ------
     InputError
-        As in `gpu_of`. Also if no PLL gives the clocks, or a frame takes longer than the display leaves.
+        As in `gpu_of`. Also if no PLL gives the clocks, or a frame takes longer than the display leaves. Also
+        if the bitstream is of another design, or has too little room.
     """
     gpu, scenes = gpu_of(board, mesh, given, colours)
     try:
@@ -79,15 +93,46 @@ def planned(
     except NoClockPlan as error:
         raise InputError(f"--clock {clock:g}", str(error), "give another rate") from error
     _check_load(gpu, plan)
-    return gpu, scenes, plan
+    if source is not None:
+        source.check_facts(facts_of(board, gpu, plan))
+        source.check_room(mesh, gpu.drawing)
+    drawing = gpu.drawing.padded(gpu.drawing.room if source is None else source.room)
+    return replace(gpu, drawing=drawing), scenes, plan
 
 
 def bitstream_of(board: Board, gpu: Gpu, plan: ClockPlan, seeds: int) -> Built:
     """The bitstream of a drawing, made by `build`. The steps are shown."""
     rates = {name: float(rate) / 1e6 for name, rate in plan.rates.items()}
+    carried = {"facts": facts_of(board, gpu, plan), "room": gpu.drawing.room}
     with steps() as show_step:
         top = BoardTop(board, GpuUnit(gpu), plan)
-        return build(board, top, rates, seeds, show_step)
+        return build(board, top, rates, seeds, show_step, carried)
+
+
+def rewritten_from(source: RoutedBitstream, board: Board, gpu: Gpu, plan: ClockPlan) -> Rewritten:
+    """The bitstream of a drawing, made from a routed bitstream of the same design. The steps are shown."""
+    with steps() as show_step:
+        show_step("netlist")
+        netlist = _same_netlist(source, board, gpu, plan)
+        return rewrite(source, netlist.patterns.contents, show_step)
+
+
+def _same_netlist(source: RoutedBitstream, board: Board, gpu: Gpu, plan: ClockPlan) -> BoardNetlist:
+    """Netlist of a drawing. It is refused if it differs from that of the bitstream."""
+    netlist = BoardNetlist.of(board, BoardTop(board, GpuUnit(gpu), plan))
+    source.check_netlist(netlist)
+    return netlist
+
+
+def facts_of(board: Board, gpu: Gpu, plan: ClockPlan) -> dict[str, str]:
+    """Facts about a design that are no words of its memories, by name."""
+    lines = design_lines(board, "", gpu, plan)
+    facts = {line[:12].strip(): line[12:] for line in lines if not line.startswith("mesh")}
+    design, background = gpu.drawing.renderer.design, gpu.buffer.background
+    facts["materials"] = str(design.materials)
+    facts["background"] = "#" + bytes(background).hex()
+    facts["back faces"] = gpu.drawing.frames[0].back_faces
+    return facts
 
 
 def write_bitstream(built: Built, path: str) -> None:
@@ -100,9 +145,19 @@ def write_bitstream(built: Built, path: str) -> None:
     """
     if missed(built):
         raise ToolError(missed(built))
+    _write(path, built.bitstream)
+
+
+def write_rewritten(rewritten: Rewritten, path: str) -> None:
+    """Print what has changed in a bitstream, and write it."""
+    click.echo("\n".join(changed_lines(rewritten)))
+    _write(path, rewritten.bitstream)
+
+
+def _write(path: str, bitstream: bytes) -> None:
     with atomic_writer(path) as temporary:
-        temporary.write_bytes(built.bitstream)
-    click.echo(f"{'bitstream':<12}{path}, {len(built.bitstream):,} bytes, read back and equal")
+        temporary.write_bytes(bitstream)
+    click.echo(f"{'bitstream':<12}{path}, {len(bitstream):,} bytes, read back and equal")
 
 
 def figures_of(built: Built) -> dict[str, Any]:
@@ -161,12 +216,25 @@ def _check_load(gpu: Gpu, plan: ClockPlan) -> None:
 
 
 def simulated(
-    board: Board, gpu: Gpu, scenes: Sequence[Scene], plan: ClockPlan, count: int, folder: Path
+    board: Board,
+    gpu: Gpu,
+    scenes: Sequence[Scene],
+    plan: ClockPlan,
+    count: int,
+    folder: Path,
+    source: RoutedBitstream | None = None,
 ) -> dict[str, Any]:
     """Simulate frames, write them, and compare them with the frames of the model and the exact frame.
 
+    The memories have the words that are read back from a bitstream, if one is given.
+
     Returns figures of the frames.
     """
+    words: AbstractContextManager[None] = nullcontext()
+    if source is not None:
+        _same_netlist(source, board, gpu, plan)
+        read = source.contents
+        words = contents_from(lambda name, width, words: read[name])
     paths = [folder / f"frame-{number:04}.png" for number in range(1, count + 1)]
     made = not folder.exists()
     try:
@@ -180,7 +248,7 @@ def simulated(
         start = perf_counter()
         rate = Fraction(plan.rates["sync"] / plan.rates["serial"])
         mode = gpu.buffer.mode
-        with progress(total=count, unit="frames") as bar:
+        with words, progress(total=count, unit="frames") as bar:
             top = OneClock(GpuUnit(gpu), rate)
             shown = show(top, mode, count, progress=lambda pixels: bar.update(pixels / mode.cycles - bar.n))
         seconds = perf_counter() - start

@@ -1,6 +1,7 @@
 """Makes the bitstream of a board's top by Yosys, nextpnr and ecppack, and reads the reached clock rates."""
 
 import contextlib
+import hashlib
 import json
 import re
 import tempfile
@@ -10,20 +11,26 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 from amaranth.hdl import Elaboratable
 
 from blysk.bench.tools.absorb_registers import absorb_registers, text_of_step
 from blysk.bench.tools.boards import Board, packages_missing
 from blysk.bench.tools.families import ECP5, signal_name
 from blysk.bench.tools.kept_builds import KeptBuild
+from blysk.bench.tools.memory_map import MemoryMap, ScenePatterns, blocks_of_netlist, carrying, memory_words
 from blysk.bench.tools.place_and_route import MAP_AFTER, MAP_BEFORE, YOSYS, versions_of
 from blysk.bench.tools.tool_runner import MOUNT, GivenUp, TooLarge, ToolError, ToolRunner, Watch
+from blysk.hdl.core.scene_memory import contents_from
 
 __all__ = [
+    "BoardNetlist",
     "Built",
     "Clock",
     "build",
+    "pack",
     "refuse_too_large",
+    "run_tool",
 ]
 
 PERIODS = 1
@@ -53,11 +60,12 @@ dfflegalize -cell $_DFF_?_ 01 -cell $_DFF_?P?_ r -cell $_SDFF_?P?_ r -cell $_DFF
 """Commands of Yosys's step ``map_ffs`` with the limit `_FEWEST`."""
 
 _MEMORIES = """\
-setattr -set ram_style "distributed" m:*render.pipeline.coordinates
+setattr -set ram_style "distributed" m:*render.pipeline.coordinates m:*render.depths
 """
 """Commands of Yosys for memories that go into look-up tables.
 
 The coordinates that wait beside shading are 64 words of 25 bits. So the table of sRGB finds room on a 25F.
+The words that wait for the depth test are 64 words of 67 bits. So the motion's coefficients find room.
 """
 
 _LAYOUT = ("--placer", "static", "--router", "router2", "--router2-alt-weights")
@@ -138,6 +146,41 @@ class Built:
     words: int
 
 
+@dataclass(frozen=True)
+class BoardNetlist:
+    """A top with the board's pins as a netlist for Yosys, with random words in the memories of its scene.
+
+    Parameters
+    ----------
+    netlist, constraints : bytes
+        Netlist in Yosys's language, and constraints of pins and clocks. They do not depend on the words of
+        the scene.
+    patterns : ScenePatterns
+        The random words, and the words of the scene.
+    """
+
+    netlist: bytes
+    constraints: bytes
+    patterns: ScenePatterns
+
+    @classmethod
+    def of(cls, board: Board, top: Elaboratable) -> "BoardNetlist":
+        """The netlist of a top that requests its pins from the platform."""
+        patterns = ScenePatterns()
+        with contents_from(patterns):
+            files = board.make().prepare(top, "top", debug_verilog=False).files
+        netlist, constraints = (
+            text if isinstance(text, bytes) else text.encode() for text in (files["top.il"], files["top.lpf"])
+        )
+        return cls(netlist, constraints, patterns)
+
+    @property
+    def digest(self) -> str:
+        """Digest of netlist and constraints, without the places of the source code."""
+        netlist = re.sub(rb"(?m)^\s*attribute \\src .*\n", b"", self.netlist)
+        return hashlib.sha256(hashlib.sha256(netlist).digest() + self.constraints).hexdigest()
+
+
 def _script(draw: float) -> str:
     """Yosys's commands for a drawing clock of ``draw`` MHz.
 
@@ -180,11 +223,16 @@ def build(
     rates: Mapping[str, float],
     seeds: int = 1,
     progress: Callable[[str], object] = lambda step: None,
+    carried: Mapping[str, Any] | None = None,
 ) -> Built:
     """Make the bitstream of a top that requests its pins from the platform.
 
     The mapped netlist and each routed placement are kept in the cache as soon as they are there. So an
-    interrupted build goes on where it was.
+    interrupted build goes on where it was. They do not depend on the words of the scene, which are written
+    after routing.
+
+    The bitstream carries a comment in JSON: ``carried``, the digest of the netlist, and where the memories of
+    the scene are (`MemoryMap`).
 
     Parameters
     ----------
@@ -199,6 +247,8 @@ def build(
         best placement.
     progress : callable
         Called with the name of each step, and every 30 seconds with the state of a step, see `Watch`.
+    carried : dict, optional
+        Facts for the comment in the bitstream.
 
     Raises
     ------
@@ -209,22 +259,21 @@ def build(
     GivenUp
         If no placement can be routed.
     ToolError
-        If a tool fails, or the bitstream reads back as another configuration.
+        If a tool fails, or the bitstream reads back as another configuration. If a memory of the scene is not
+        in block RAM.
     """
     packages_missing()
-    platform = board.make()
-    plan = platform.prepare(top, "top", debug_verilog=False)
+    given = BoardNetlist.of(board, top)
     runner = ToolRunner()
     with tempfile.TemporaryDirectory(prefix="blysk-") as name, contextlib.ExitStack() as stack:
         stack.callback(runner.stop)
         folder = Path(name)
-        for file in ("top.il", "top.lpf"):
-            text = plan.files[file]
-            (folder / file).write_bytes(text if isinstance(text, bytes) else text.encode())
+        for file, text in (("top.il", given.netlist), ("top.lpf", given.constraints)):
+            (folder / file).write_bytes(text)
         script = _script(rates["sync"])
         options = repr((board.options, _LAYOUT, _SETTINGS, versions_of(ECP5)))
         step = text_of_step()
-        kept = KeptBuild((plan.files["top.il"], plan.files["top.lpf"], script, options, step))
+        kept = KeptBuild((given.netlist, given.constraints, script, options, step))
         progress("mapping")
         if not kept.take(folder, "netlist.json"):
             runner.run("Yosys", YOSYS, [], folder, script, watch=Watch("mapping", progress))
@@ -234,6 +283,7 @@ def build(
         mapped["modules"]["top"]["settings"] = _SETTINGS
         (folder / "top.json").write_text(json.dumps(mapped), encoding="utf-8")
         refuse_too_large(board, mapped)
+        _map(blocks_of_netlist(mapped), given.patterns)
         best = reason = None
         for seed in range(1, seeds + 1):
             progress(f"placement {seed}")
@@ -253,7 +303,8 @@ def build(
             raise GivenUp(f"the {board.name} is not routed: {reason}; give more --seeds")
         _, seed, report, clocks = best
         progress("bitstream")
-        words = _pack(runner, folder, f"{seed}.config")
+        _fill(folder, f"{seed}.config", given, carried or {})
+        words = pack(runner, folder, "filled.config")
         return Built(
             {name: _used(report, kind) for name, kind in _PARTS.items()},
             clocks,
@@ -262,6 +313,22 @@ def build(
             (folder / "top.bit").read_bytes(),
             words,
         )
+
+
+def _fill(folder: Path, configuration: str, given: BoardNetlist, facts: Mapping[str, Any]) -> None:
+    """Write ``filled.config``: a routed configuration with the words of the scene, and its comment."""
+    routed = (folder / configuration).read_text(encoding="utf-8")
+    memories = _map(memory_words(routed), given.patterns)
+    comment = {**facts, "netlist": given.digest, "memories": memories.to_json()}
+    filled = memories.replaced(routed, given.patterns.contents)
+    (folder / "filled.config").write_text(carrying(filled, comment), encoding="utf-8")
+
+
+def _map(blocks: Mapping[str, np.ndarray], patterns: ScenePatterns) -> MemoryMap:
+    try:
+        return MemoryMap.found(blocks, patterns)
+    except ValueError as error:
+        raise ToolError(str(error)) from None
 
 
 def refuse_too_large(board: Board, netlist: Mapping[str, Any]) -> None:
@@ -365,7 +432,15 @@ def _described(path: Sequence[Mapping[str, Any]], delay: float) -> str:
     return f"{start} -> {end}, {delay:.1f} ns, {cells} cells"
 
 
-def _pack(runner: ToolRunner, folder: Path, configuration: str) -> int:
+def run_tool(
+    runner: ToolRunner, folder: Path, tool: str, source: str, option: str, target: str, *others: str
+) -> None:
+    """Run ecppack or ecpunpack in a folder. The option names what the tool writes."""
+    files = ["--input", f"{MOUNT}/{source}", option, f"{MOUNT}/{target}"]
+    runner.run(tool, _nextpnr(tool), [*files, *others], folder)
+
+
+def pack(runner: ToolRunner, folder: Path, configuration: str) -> int:
     """Make ``top.bit`` from a configuration in text, read it back, and compare.
 
     The read-back text may name settings differently, because several names stand for one bit. So the text is
@@ -382,18 +457,11 @@ def _pack(runner: ToolRunner, folder: Path, configuration: str) -> int:
         ("ecppack", "back.config", "--bit", "again.bit"),
     )
     for tool, source, option, target in steps:
-        files = ["--input", f"{MOUNT}/{source}", option, f"{MOUNT}/{target}"]
         compress = ["--compress"] if tool == "ecppack" else []
-        runner.run(tool, _nextpnr(tool), files + compress, folder)
+        run_tool(runner, folder, tool, source, option, target, *compress)
     if (folder / "top.bit").read_bytes() != (folder / "again.bit").read_bytes():
         raise ToolError("the bitstream differs after it is read back and packed again")
-    sent, back = (_memories((folder / name).read_text()) for name in (configuration, "back.config"))
-    if sent != back:
+    sent, back = (memory_words((folder / name).read_text()) for name in (configuration, "back.config"))
+    if sent.keys() != back.keys() or any((sent[number] != back[number]).any() for number in sent):
         raise ToolError("the bitstream reads back with other contents of memories")
     return sum(map(len, sent.values()))
-
-
-def _memories(text: str) -> dict[str, list[str]]:
-    """Words of the block RAMs of a configuration in text, by their numbers."""
-    found = re.findall(r"^\.bram_init (\d+)\n((?:[0-9a-f ]+\n)+)", text, re.MULTILINE)
-    return {number: words.split() for number, words in found}

@@ -54,7 +54,7 @@ MAX_LIGHTS = 4
 _SHINIER = 4
 """Exponent of the second material, as a multiple of the exponent of the first material."""
 
-_RENDERER_BLOCKS = {"compact": 19, "throughput": 44}
+_RENDERER_BLOCKS = {"compact": 19, "throughput": 46}
 """Block RAMs of the renderer's tables and buffers, command lists and motion, by the style of geometry."""
 
 _SURFACE_BLOCKS = {
