@@ -190,12 +190,13 @@ def parts(name: str, lights: int, mesh: str, size: Sequence[int], netlist: bool)
     mesh, size
         Scene in which the words are counted; parts do not depend on it.
     netlist : bool
-        Whether a design's netlist is read, too. It takes seconds.
+        Whether a design's netlist with one light is read, too. It takes seconds.
 
     Returns
     -------
     dict
-        - ``multipliers`` for a pixel a cycle, ``adder_bits``, ``memory_bits``, ``register_bits``;
+        - ``multipliers`` for a pixel a cycle, or ``None`` if neither trace nor netlist has them;
+        - ``adder_bits``, ``memory_bits``, ``register_bits``;
         - ``products``: products of a ``pixel``, a ``span`` and a ``triangle``;
         - ``netlist``: multipliers of the netlist, or ``None``;
         - ``bits``: bits of a beat, ``beat``: ``span`` or ``triangle``;
@@ -209,7 +210,7 @@ def parts(name: str, lights: int, mesh: str, size: Sequence[int], netlist: bool)
     is_design = isinstance(rival, SpanDesign)
     counted = not is_design or rival.COUNTS_SETUP
     of_netlist = None
-    if is_design and (netlist or not counted):
+    if is_design and lights == 1 and (netlist or not counted):
         of_netlist = cost_of(unit_of(rival.design(lights))).multiplier_count
     share = rival.SPAN_CYCLES, rival.SETUP_CYCLES
     return {
@@ -240,8 +241,10 @@ def tasks(quick: bool) -> list[Task]:
     ]
 
 
-def area_of(of: Mapping[str, Any]) -> int:
+def area_of(of: Mapping[str, Any]) -> int | None:
     """Area of the result of `parts`, in bits of adders: `PRODUCT_AREA` for a multiplier, and its adders."""
+    if of["multipliers"] is None:
+        return None
     area: int = PRODUCT_AREA * of["multipliers"] + of["adder_bits"]
     return area
 
@@ -328,6 +331,7 @@ def _drawings(of_mesh: Mapping, of_lights: Mapping) -> list[tuple[Drawing, str]]
         f"{lights} light{'s' * (lights > 1)}": {
             name: (area_of(of[name]) * _drawn(found)["cycles"], _drawn(found)["max_lsb"])
             for name, found in of_mesh[middle].items()
+            if area_of(of[name])
         }
         for lights, of in of_lights.items()
     }
@@ -416,7 +420,7 @@ def _parts_table(of_lights: Mapping[int, Mapping[str, Mapping[str, Any]]]) -> Ta
     note = (
         "Multipliers have 18x18 bits. Products of a span share multipliers over three cycles (`renormalise`: "
         "over its interval), and products of a triangle over eight. Parts are counted from the words of the "
-        "models. Where the netlist is read, its multipliers check the count. `kuijk-blake` has the "
+        "models. With one light the multipliers of the netlist check the count. `kuijk-blake` has the "
         "multipliers of its netlist, and no adders, tables and registers of its setup."
     )
     return Table("rivals-parts", "Parts of every method, for a pixel a cycle", columns, rows, note)
