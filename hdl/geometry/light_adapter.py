@@ -88,20 +88,7 @@ class LightAdapterUnit(wiring.Component):
         given, made = self.i.payload, self.lights * self.rows
         result = Signal(self.o.payload.shape(), name="result")
         valid, advance = Signal(self.latency - 1, name="valid"), Signal(name="advance")
-        # The unit stops while a result has no place. Results are three cycles apart, so one register is
-        # enough.
-        offered, waits = Signal(name="offered"), Signal(name="waits")
-        output = Signal.like(result, name="output", reset_less=True)
-        still = offered & ~self.o.ready
-        m.d.comb += [
-            advance.eq(~(valid[-1] & waits)),
-            self.o.valid.eq(offered),
-            copy(self.o.payload, output),
-        ]
-        moves = valid[-1] & ~waits
-        m.d.sync += [waits.eq(still), offered.eq(still | moves)]
-        with m.If(moves):
-            m.d.sync += copy(output, result)
+        self._offer(m, valid, advance, result)
         axis, last = Signal(range(_AXES), name="axis"), Signal(name="last_turn")
         ends_row = Signal(name="ends_row")
         m.d.comb += [
@@ -185,6 +172,24 @@ class LightAdapterUnit(wiring.Component):
             words[name] = Cat(words[name], *sums[number * made : (number + 1) * made])
         m.d.comb += [Value.cast(result[name]).eq(word) for name, word in words.items()]
         return m
+
+    def _offer(self, m: Module, valid: Signal, advance: Signal, result) -> None:
+        """The output register. The unit stops while a result has no place.
+
+        Results are three cycles apart, so one register is enough.
+        """
+        offered, waits = Signal(name="offered"), Signal(name="waits")
+        output = Signal.like(result, name="output", reset_less=True)
+        still = offered & ~self.o.ready
+        m.d.comb += [
+            advance.eq(~(valid[-1] & waits)),
+            self.o.valid.eq(offered),
+            copy(self.o.payload, output),
+        ]
+        moves = valid[-1] & ~waits
+        m.d.sync += [waits.eq(still), offered.eq(still | moves)]
+        with m.If(moves):
+            m.d.sync += copy(output, result)
 
     def _axes(self, m: Module, name: str, place: Value, chosen: Value) -> ReadPort:
         """Read port of a memory of axes. ``chosen`` tells whether a write is for this memory."""
