@@ -15,7 +15,8 @@ from blysk.golden.presets import preset
 from blysk.golden.reference.scene import Scene
 from blysk.golden.render import DrawnPixels, Renderer
 from blysk.golden.video.controls import Controls
-from blysk.golden.video.draw_commands import KINDS, DrawCommands
+from blysk.golden.video.draw_commands import COMMAND_BITS, KINDS, DrawCommands
+from blysk.golden.video.memory_contents import MemoryContents
 from blysk.golden.video.mesh_memory import MeshMemory
 from blysk.golden.video.motion import Motion, rotation
 from blysk.golden.video.triangle_assembly import TriangleAssembly
@@ -247,6 +248,20 @@ class Drawing:
     def bands(self) -> int:
         """Number of bands."""
         return -(-self.size[1] // self.lines)
+
+    @property
+    def memories(self) -> tuple[MemoryContents, ...]:
+        """The memories that hold the mesh, its motion, and what it is drawn with.
+
+        Constants of the frame are in the commands. The coefficients are those of the matrices.
+        """
+        mesh, commands, rows = self.mesh, self.commands.codes, self.motion.words
+        return (
+            MemoryContents("vertices", mesh.vertex_bits, mesh.vertex_room, tuple(mesh.vertex_words)),
+            MemoryContents("triangles", 3 * mesh.index_bits, mesh.triangle_room, tuple(mesh.triangle_words)),
+            MemoryContents("commands", COMMAND_BITS, len(commands), tuple(commands)),
+            MemoryContents("coefficients", self.motion.WORD_BITS, len(rows), tuple(rows)),
+        )
 
     @property
     def assembly(self) -> TriangleAssembly:

@@ -1,12 +1,14 @@
-"""Memories whose words depend on the scene, and other words for them."""
+"""Memories whose words depend on the scene, other words for them, and their writes."""
 
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from contextvars import ContextVar
 
+from amaranth.hdl import Module, Shape, Value, ValueLike, unsigned
+from amaranth.lib import data, stream
 from amaranth.lib.memory import Memory
 
-__all__ = ["Contents", "contents_from", "scene_memory"]
+__all__ = ["Contents", "contents_from", "scene_memory", "word_write_shape", "write_words"]
 
 Contents = Callable[[str, int, Sequence[int]], Sequence[int]]
 """Gives the words of a `scene_memory` from its name, the bits of a word, and the words of its scene."""
@@ -45,3 +47,39 @@ def scene_memory(name: str, width: int, depth: int, words: Sequence[int]) -> Mem
     if chosen := _CONTENTS.get():
         words = chosen(name, width, [*words, *[0] * (depth - len(words))])
     return Memory(shape=width, depth=depth, init=words)
+
+
+def word_write_shape(depth: int, width: int) -> data.StructLayout:
+    """Shape of a write into a memory: address, and the bytes of a word, the lowest first."""
+    place = unsigned(max((depth - 1).bit_length(), 1))
+    return data.StructLayout({"address": place, "data": data.ArrayLayout(8, -(-width // 8))})
+
+
+def write_words(m: Module, memory: Memory, write: stream.Interface, idle: ValueLike) -> Value:
+    """Write a memory from a stream of `word_write_shape`, while the unit does not read.
+
+    Parameters
+    ----------
+    m : Module
+        Module that gets the logic.
+    memory : Memory
+        The memory.
+    write : stream.Interface
+        Words to write.
+    idle : ValueLike
+        Whether the unit reads no word.
+
+    Returns
+    -------
+    Value
+        Whether a word is written. If no port reads in this cycle, a block RAM needs no logic beside it.
+    """
+    port = memory.write_port()
+    width = Shape.cast(memory.shape).width
+    m.d.comb += [
+        write.ready.eq(idle),
+        port.addr.eq(write.payload.address),
+        port.data.eq(Value.cast(write.payload.data)[:width]),
+        port.en.eq(write.valid & idle),
+    ]
+    return port.en

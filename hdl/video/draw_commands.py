@@ -5,7 +5,7 @@ from amaranth.lib import data, stream, wiring
 from amaranth.lib.wiring import In, Out
 
 from blysk.golden.video.draw_commands import COMMAND_BITS, KINDS, DrawCommands
-from blysk.hdl.core.scene_memory import scene_memory
+from blysk.hdl.core.scene_memory import scene_memory, word_write_shape, write_words
 from blysk.hdl.core.stream import skid_buffer
 
 __all__ = ["DrawCommandsUnit", "command_shape", "walk_request_shape"]
@@ -34,24 +34,30 @@ class DrawCommandsUnit(wiring.Component):
     Parameters
     ----------
     model : DrawCommands
-        Bit-accurate model with the words, fixed at build time.
+        Bit-accurate model with the words after power-up.
+    loads : bool
+        Whether the memory can be written.
 
     Members
     -------
     i : :py:`In(stream.Signature(walk_request_shape(commands)))`
         Requests.
+    write : :py:`In(stream.Signature(word_write_shape(commands, COMMAND_BITS)))`
+        Words to write, accepted while no list is walked. Only with ``loads``.
     o : :py:`Out(stream.Signature(command_shape()))`
         Commands of the list, the command ``end`` last.
 
     Source: docs/theory/video.md#bands; [T] chapter 4.
     """
 
-    def __init__(self, model: DrawCommands):
-        self.model = model
+    def __init__(self, model: DrawCommands, loads: bool = False):
+        self.model, self.loads = model, loads
+        write = word_write_shape(len(model.words), COMMAND_BITS)
         super().__init__(
             {
                 "i": In(stream.Signature(walk_request_shape(len(model.words)))),
                 "o": Out(stream.Signature(command_shape())),
+                **({"write": In(stream.Signature(write))} if loads else {}),
             }
         )
 
@@ -67,10 +73,12 @@ class DrawCommandsUnit(wiring.Component):
         once = (command.kind == KINDS.index("transform")) | (command.kind == KINDS.index("frame_constant"))
         ends = valid & (command.kind == KINDS.index("end"))
         advance = skid_buffer(m, self.o, valid & (first_band | ~once), read.data)
+        idle = ~walks & ~waits
+        written = write_words(m, memory, self.write, idle) if self.loads else None
         m.d.comb += [
             read.addr.eq(address),
-            read.en.eq(advance),
-            self.i.ready.eq(~walks & ~waits),
+            read.en.eq(advance if written is None else advance & ~written),
+            self.i.ready.eq(idle),
         ]
         with m.If(self.i.valid & self.i.ready):
             m.d.sync += [address.eq(self.i.payload.start), first_band.eq(self.i.payload.first_band)]

@@ -24,7 +24,7 @@ from blysk.hdl.video.motion import MotionUnit
 from blysk.hdl.video.triangle_assembly import TriangleAssemblyUnit
 from blysk.hdl.video.vertex_unit import VertexUnit, matrix_shape
 
-__all__ = ["STATUS", "DrawUnit", "band_shape", "drawn_band_pixel_shape"]
+__all__ = ["STATUS", "DrawUnit", "band_shape", "drawn_band_pixel_shape", "load_shape"]
 
 STATUS = (*COUNTERS, *RENDERED, "frames", "bands", "busy")
 """Counters of `DrawUnit`: those of assembly and renderer, then begun frames, begun bands, busy cycles."""
@@ -33,6 +33,13 @@ STATUS = (*COUNTERS, *RENDERED, "frames", "bands", "busy")
 def band_shape(bands: int):
     """Shape of a band's index."""
     return unsigned(max((bands - 1).bit_length(), 1))
+
+
+def load_shape(model: Drawing) -> data.StructLayout:
+    """Shape of a word for a memory of `Drawing.memories`: its index, address, bytes from the lowest on."""
+    size = max(memory.word_bytes for memory in model.memories)
+    place = {"target": unsigned(2), "address": unsigned(16)}
+    return data.StructLayout({**place, "data": data.ArrayLayout(8, size)})
 
 
 def drawn_band_pixel_shape(x_bits: int, y_bits: int) -> data.StructLayout:
@@ -60,6 +67,8 @@ class DrawUnit(wiring.Component):
     ----------
     model : Drawing
         Bit-accurate model, with all contents of memories.
+    loads : bool
+        Whether the memories of `Drawing.memories` can be written.
 
     Members
     -------
@@ -73,19 +82,25 @@ class DrawUnit(wiring.Component):
         Buttons, see `ControlsUnit`.
     status : :py:`Out(counters_shape(*STATUS))`
         Counters since the reset.
+    rest : :py:`In(1)`
+        While it is high, no band is accepted. Only with ``loads``.
+    load : :py:`In(stream.Signature(load_shape(model)))`
+        Words to write, accepted while the unit rests. The next band then begins a frame. Only with ``loads``.
 
     Source: docs/theory/video.md#bands; [T] figure 4.10.
     """
 
-    def __init__(self, model: Drawing):
-        self.model = given = model
+    def __init__(self, model: Drawing, loads: bool = False):
+        self.model, self.loads = model, loads
+        given = model
         design = given.renderer.design
         self.render = RendererUnit(given.renderer)
         self.depth = BandDepthUnit(BandDepth((given.size[0], given.lines)), design.x_bits, design.y_bits)
-        self.mesh, self.commands = MeshMemoryUnit(given.mesh), DrawCommandsUnit(given.commands)
+        self.mesh = MeshMemoryUnit(given.mesh, loads)
+        self.commands = DrawCommandsUnit(given.commands, loads)
         self.vertex = VertexUnit(given.transform, given.mesh.index_bits)
-        self.assembly = TriangleAssemblyUnit(given.assembly)
-        self.motion, self.controls = MotionUnit(given.motion), ControlsUnit(given.controls)
+        self.assembly = TriangleAssemblyUnit(given.assembly, loads)
+        self.motion, self.controls = MotionUnit(given.motion, loads), ControlsUnit(given.controls)
         band = band_shape(given.bands)
         super().__init__(
             {
@@ -94,6 +109,7 @@ class DrawUnit(wiring.Component):
                 "pixels": Out(stream.Signature(drawn_band_pixel_shape(design.x_bits, design.y_bits))),
                 "buttons": In(len(BUTTONS)),
                 "status": Out(counters_shape(*STATUS)),
+                **({"rest": In(1), "load": In(stream.Signature(load_shape(given)))} if loads else {}),
             }
         )
 
@@ -174,13 +190,17 @@ class DrawUnit(wiring.Component):
                 m.d.comb += self.depth.begin.eq(1)
                 m.next = "wait"
             with m.State("wait"):
-                m.d.comb += self.request.ready.eq(~self.depth.busy)
+                m.d.comb += self.request.ready.eq(
+                    ~self.depth.busy & ~self.rest if self.loads else ~self.depth.busy
+                )
                 m.d.sync += [band.eq(self.request.payload), first.eq(~begun | (self.request.payload <= band))]
                 with m.If(self.request.valid & self.request.ready):
                     m.d.sync += begun.eq(1)
                     m.next = "begin"
                 with m.Else():
                     m.d.sync += [band.eq(band), first.eq(first)]
+                if self.loads:
+                    self._load(m, begun)
             with m.State("begin"):
                 m.d.comb += self.controls.frame.eq(first)
                 m.d.sync += [
@@ -208,6 +228,23 @@ class DrawUnit(wiring.Component):
             begins = state.ongoing("begin")
             waits = state.ongoing("wait")
         self._count(m, frames=begins & first, bands=begins, busy=~waits | self.depth.busy)
+
+    def _load(self, m: Module, begun: Signal) -> None:
+        """Write a word while the unit rests."""
+        load, given = self.load, self.load.payload
+        writes = (self.mesh.write, self.assembly.faces, self.commands.write, self.motion.write)
+        with m.If(self.rest), m.Switch(given.target):
+            for target, write in enumerate(writes):
+                address, data = write.payload.address, Value.cast(write.payload.data)
+                with m.Case(target):
+                    m.d.comb += [
+                        address.eq(given.address),
+                        data.eq(Value.cast(given.data)),
+                        write.valid.eq(load.valid),
+                        load.ready.eq(write.ready),
+                    ]
+        with m.If(load.valid & load.ready):
+            m.d.sync += begun.eq(0)
 
     def _command(self, m: Module, idle: Signal) -> None:
         """States that execute the commands."""

@@ -5,7 +5,7 @@ from amaranth.lib import data, stream, wiring
 from amaranth.lib.wiring import In, Out
 
 from blysk.golden.video.mesh_memory import MeshMemory
-from blysk.hdl.core.scene_memory import scene_memory
+from blysk.hdl.core.scene_memory import scene_memory, word_write_shape, write_words
 from blysk.hdl.core.stream import skid_buffer
 from blysk.hdl.video.vertex_unit import mesh_vertex_shape
 
@@ -21,7 +21,7 @@ def range_shape() -> data.StructLayout:
 
 
 class MeshMemoryUnit(wiring.Component):
-    """Reads ranges of vertices, a vertex a cycle, from a memory with contents fixed at build time.
+    """Reads ranges of vertices, a vertex a cycle, from a memory that holds a mesh after power-up.
 
     A range is accepted while no other range is read. Its first vertex is offered two cycles later. The unit
     has no multipliers.
@@ -30,11 +30,15 @@ class MeshMemoryUnit(wiring.Component):
     ----------
     model : MeshMemory
         The vertices.
+    loads : bool
+        Whether the memory can be written.
 
     Members
     -------
     i : :py:`In(stream.Signature(range_shape()))`
         Ranges.
+    write : :py:`In(stream.Signature(word_write_shape(vertex_room, vertex_bits)))`
+        Words to write, accepted while no range is read. Only with ``loads``.
     o : :py:`Out(stream.Signature(mesh_vertex_shape(index_bits, surface)))`
         Vertices of the ranges.
 
@@ -43,12 +47,14 @@ class MeshMemoryUnit(wiring.Component):
 
     latency = 2
 
-    def __init__(self, model: MeshMemory):
-        self.model = model
+    def __init__(self, model: MeshMemory, loads: bool = False):
+        self.model, self.loads = model, loads
+        write = word_write_shape(model.vertex_room, model.vertex_bits)
         super().__init__(
             {
                 "i": In(stream.Signature(range_shape())),
                 "o": Out(stream.Signature(mesh_vertex_shape(model.index_bits, model.surface))),
+                **({"write": In(stream.Signature(write))} if loads else {}),
             }
         )
 
@@ -68,11 +74,12 @@ class MeshMemoryUnit(wiring.Component):
         payload = Signal(self.o.payload.shape(), name="vertex")
         advance = skid_buffer(m, self.o, valid, payload)
         words = Value.cast(payload)[given.index_bits :]
+        written = write_words(m, memory, self.write, left == 0) if self.loads else None
         m.d.comb += [
             payload.index.eq(index),
             words.eq(read.data),
             read.addr.eq(address),
-            read.en.eq(advance),
+            read.en.eq(advance if written is None else advance & ~written),
             self.i.ready.eq(left == 0),
         ]
         with m.If(advance):

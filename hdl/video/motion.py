@@ -10,7 +10,7 @@ from amaranth.lib.wiring import In, Out
 from blysk.golden.video.motion import ANGLE_BITS, ENTRIES, Motion
 from blysk.golden.video.vertex_unit import ENTRY, OFFSET
 from blysk.hdl.core.fixed import FixedShape, FixedValue
-from blysk.hdl.core.scene_memory import scene_memory
+from blysk.hdl.core.scene_memory import scene_memory, word_write_shape, write_words
 
 __all__ = ["MotionUnit", "entry_shape", "turn_shape"]
 
@@ -44,12 +44,16 @@ class MotionUnit(wiring.Component):
     Parameters
     ----------
     model : Motion
-        Bit-accurate model with the coefficients.
+        Bit-accurate model with the coefficients after power-up.
+    loads : bool
+        Whether the memory of the coefficients can be written.
 
     Members
     -------
     i : :py:`In(stream.Signature(turn_shape(slots)))`
         Requests.
+    write : :py:`In(stream.Signature(word_write_shape(21 slots, 61)))`
+        Words to write, accepted while no matrix is computed. Only with ``loads``.
     o : :py:`Out(stream.Signature(entry_shape()))`
         21 entries for each request.
 
@@ -63,12 +67,14 @@ class MotionUnit(wiring.Component):
         "total": "Σ a·b",
     }
 
-    def __init__(self, model: Motion):
-        self.model = model
+    def __init__(self, model: Motion, loads: bool = False):
+        self.model, self.loads = model, loads
+        write = word_write_shape(ENTRIES * model.slots, model.WORD_BITS)
         super().__init__(
             {
                 "i": In(stream.Signature(turn_shape(model.slots))),
                 "o": Out(stream.Signature(entry_shape())),
+                **({"write": In(stream.Signature(write))} if loads else {}),
             }
         )
 
@@ -79,6 +85,9 @@ class MotionUnit(wiring.Component):
         rows = model.words
         m.submodules.coefficients = memory = scene_memory("coefficients", model.WORD_BITS, len(rows), rows)
         read = memory.read_port()
+        if self.loads:
+            waits = Signal(name="waits")
+            m.d.comb += read.en.eq(~write_words(m, memory, self.write, waits))
         sines = model.table.codes.tolist()
         m.submodules.sines = table = Memory(shape=ENTRY.width - 1, depth=len(sines), init=sines)
         look = table.read_port()
@@ -107,6 +116,8 @@ class MotionUnit(wiring.Component):
         with m.FSM(name="state"):
             with m.State("wait"):
                 m.d.comb += self.i.ready.eq(1)
+                if self.loads:
+                    m.d.comb += waits.eq(1)
                 m.d.sync += [step.eq(0), index.eq(0), angle.eq(self.i.payload.angle)]
                 with m.If(self.i.valid):
                     m.d.sync += address.eq(self.i.payload.slot * ENTRIES)

@@ -8,7 +8,7 @@ from amaranth.lib.wiring import In, Out
 from blysk.golden.geometry.edge_setup import X_BITS
 from blysk.golden.geometry.triangles import MATERIAL_BITS
 from blysk.golden.video.triangle_assembly import COUNTERS, TriangleAssembly
-from blysk.hdl.core.scene_memory import scene_memory
+from blysk.hdl.core.scene_memory import scene_memory, word_write_shape, write_words
 from blysk.hdl.core.views import copy
 from blysk.hdl.geometry.triangles import count_events, counters_shape, first_centre, triangle_shape
 from blysk.hdl.video.mesh_memory import range_shape
@@ -38,6 +38,8 @@ class TriangleAssemblyUnit(wiring.Component):
     ----------
     model : TriangleAssembly
         Bit-accurate model, with the mesh memory.
+    loads : bool
+        Whether the memory of the triangles can be written.
 
     Members
     -------
@@ -47,6 +49,8 @@ class TriangleAssemblyUnit(wiring.Component):
         The triangles to draw.
     write : :py:`In(stream.Signature({"index", "vertex": screen_vertex_shape(grid, surface)}))`
         Vertices of the frame, one a cycle, while no triangle is read.
+    faces : :py:`In(stream.Signature(word_write_shape(triangle_room, 3 index_bits)))`
+        Triangles to write, accepted while no range is read. Only with ``loads``.
     constants : :py:`In(band_rows_shape())`
         The band, constant while triangles are read.
     status : :py:`Out(counters_shape(*COUNTERS))`
@@ -62,11 +66,12 @@ class TriangleAssemblyUnit(wiring.Component):
 
     latency = 6
 
-    def __init__(self, model: TriangleAssembly):
-        self.model = model
+    def __init__(self, model: TriangleAssembly, loads: bool = False):
+        self.model, self.loads = model, loads
         surface = model.mesh.surface
         vertex = screen_vertex_shape(model.grid, surface)
         index = unsigned(model.mesh.index_bits)
+        faces = word_write_shape(model.mesh.triangle_room, 3 * model.mesh.index_bits)
         super().__init__(
             {
                 "i": In(stream.Signature(draw_shape())),
@@ -74,6 +79,7 @@ class TriangleAssemblyUnit(wiring.Component):
                 "write": In(stream.Signature(data.StructLayout({"index": index, "vertex": vertex}))),
                 "constants": In(band_rows_shape()),
                 "status": Out(counters_shape(*COUNTERS)),
+                **({"faces": In(stream.Signature(faces))} if loads else {}),
             }
         )
         self.idle = Signal(name="idle")
@@ -109,10 +115,13 @@ class TriangleAssemblyUnit(wiring.Component):
         material, corner = Signal(MATERIAL_BITS, name="material"), Signal(2, name="corner")
         walks = Signal(name="walks")
         last = corner == 2
+        rests, reads = (left == 0) & ~walks, advance & (~walks | last)
+        if self.loads:
+            reads = reads & ~write_words(m, triangles, self.faces, rests)
         m.d.comb += [
-            self.i.ready.eq((left == 0) & ~walks),
+            self.i.ready.eq(rests),
             face.addr.eq(following),
-            face.en.eq(advance & (~walks | last)),
+            face.en.eq(reads),
             read.addr.eq(
                 Mux(
                     self.write.valid,

@@ -33,14 +33,15 @@ class OneClock(wiring.Component):
     Parameters
     ----------
     top : Component
-        The top module, with the members ``pairs`` and ``status``, and perhaps ``buttons``.
+        The top module, with the members ``pairs`` and ``status``, and perhaps ``buttons`` and ``line``.
     rate : Fraction
         Rate of ``sync`` over the rate of ``serial``, at most 1.
 
     Members
     -------
     i : :py:`In(stream.Signature(buttons))`
-        State of the buttons from this cycle on.
+        State of the buttons from this cycle on. A top module with ``line`` takes the level of its serial line
+        in place of the buttons.
     o : :py:`Out(stream.Signature(32))`
         Bits of the lanes in four cycles: for each cycle two bits of lane 0, two of lane 1, and so on. The
         sink must be ready in every cycle.
@@ -60,7 +61,8 @@ class OneClock(wiring.Component):
                 "the rate of the drawing clock must be over 0, and at most the rate of the serial clock"
             )
         members = top.signature.members
-        buttons = members["buttons"].shape if "buttons" in members else 1
+        self._driven = next((name for name in ("line", "buttons") if name in members), None)
+        buttons = members[self._driven].shape if self._driven else 1
         super().__init__(
             {
                 "i": In(stream.Signature(buttons)),
@@ -90,11 +92,12 @@ class OneClock(wiring.Component):
         m.submodules.inner = DomainRenamer({"pixel": "sync", "serial": "sync"})(enabled)
 
         m.d.comb += self.i.ready.eq(1)
-        if "buttons" in top.signature.members:
-            buttons = Signal.like(top.buttons, name="pressed")
+        if self._driven:
+            driven = getattr(top, self._driven)
+            buttons = Signal.like(driven, name="pressed")
             with m.If(self.i.valid):
                 m.d.sync += buttons.eq(self.i.payload)
-            m.d.comb += top.buttons.eq(buttons)
+            m.d.comb += driven.eq(buttons)
         count, word = Signal(range(CYCLES), name="count"), Signal(2 * LANES * CYCLES, name="word")
         last = Signal(name="last")
         m.d.sync += [
