@@ -9,7 +9,7 @@ from typing import Any
 import click
 from click.core import ParameterSource
 
-from blysk.bench.tools.board_options import COLOURS, DEFAULTS, OPTIONS
+from blysk.bench.tools.board_options import COLOURS, DEFAULTS, LOADERS, OPTIONS
 from blysk.bench.tools.boards import board_named, packages_missing
 from blysk.sim.api.options import DESIGN, SCENE
 from blysk.sim.api.settings import check_mesh, read_settings
@@ -65,12 +65,31 @@ _MOST_FRAMES = 60
     "--mesh, materials, lights and motion. Nothing is placed or routed. With --simulate: simulate the words "
     "of its memories.",
 )
+@click.option(
+    "--loader",
+    type=Choice("loader", LOADERS),
+    help="Add a loader, which takes other meshes of blysk send: from the serial port, from the flash after "
+    "power-up, or both.  [default: none]",
+)
 @click.option("--record", type=OutputFile(), help="JSON file to which the figures of this run are added.")
 @click.option("--load", is_flag=True, help="Load the bitstream with openFPGALoader.")
 @options_of(OPTIONS)
 @click.pass_context
 def command(
-    context, board_name, mesh, output, simulate, colours, clock, toggles, seeds, routed, record, load, **_
+    context,
+    board_name,
+    mesh,
+    output,
+    simulate,
+    colours,
+    clock,
+    toggles,
+    seeds,
+    routed,
+    loader,
+    record,
+    load,
+    **_,
 ):
     """Show a turning mesh on the monitor of BOARD: ulx3s-25f, ulx3s-85f or icepi-zero.
 
@@ -99,7 +118,7 @@ def command(
     if output is None:
         raise InputError("board", "nothing to write", "give -o FILE.bit, or --simulate N -o FOLDER")
     given = given_options(context, OPTIONS)
-    loader = _loader() if load else ""
+    program = _loader() if load else ""
     if toggles and not simulate:
         raise InputError("--toggles", "counts bits of a simulation", "also give --simulate N")
     if simulate and load:
@@ -119,12 +138,12 @@ def command(
     from blysk.bench.tools.board_from import RoutedBitstream
 
     source = None if routed is None else RoutedBitstream.read(routed)
-    gpu, scenes, plan = work.planned(board, mesh, given, colours, clock, source)
+    gpu, scenes, plan = work.planned(board, mesh, given, colours, clock, source, loader)
     click.echo("\n".join(work.design_lines(board, mesh, gpu, plan)))
     if source is not None and not simulate:
         work.write_rewritten(work.rewritten_from(source, board, gpu, plan), output)
         if load:
-            work.load_bitstream(loader, board, output)
+            work.load_bitstream(program, board, output)
         return
     if not simulate:
         click.echo(f"{'bitstream':<12}known: {board.known}")
@@ -143,7 +162,7 @@ def command(
         write_json(record, recorded)
     work.write_bitstream(built, output)
     if load:
-        work.load_bitstream(loader, board, output)
+        work.load_bitstream(program, board, output)
 
 
 def _refuse_unused(context: click.Context, names: Iterable[str]) -> None:

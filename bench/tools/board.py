@@ -21,9 +21,11 @@ import numpy as np
 from blysk.bench.tools.board_build import BoardNetlist, Built, build
 from blysk.bench.tools.board_design import BoardTop, gpu_of, least_cycles
 from blysk.bench.tools.board_from import Rewritten, RoutedBitstream, changed_lines, rewrite
+from blysk.bench.tools.board_loader import loader_of
 from blysk.bench.tools.boards import Board
 from blysk.bench.tools.tool_runner import ToolError
 from blysk.golden.albedo.albedo import Albedo
+from blysk.golden.bus.loader import BAUD
 from blysk.golden.frames.border import BORDER
 from blysk.golden.frames.compare import compare_image
 from blysk.golden.gpu import Gpu
@@ -68,6 +70,8 @@ def planned(
     colours: str | None,
     clock: float,
     source: RoutedBitstream | None = None,
+    loader: str | None = None,
+    made_for: str | None = None,
 ) -> tuple[Gpu, list[Scene], ClockPlan]:
     """The drawing of a mesh on a board, the scenes of its presets, and its clocks.
 
@@ -80,12 +84,16 @@ def planned(
     source : RoutedBitstream, optional
         Bitstream of the same design, whose memories the drawing must fit. By default memories have room for
         as many words as their block RAMs hold.
+    loader : str, optional
+        Source of a loader's bytes, one of `LOADERS`. By default there is no loader.
+    made_for : str, optional
+        With a loader: mesh of the bitstream, whose memories the drawing must fit. By default ``mesh``.
 
     Raises
     ------
     InputError
-        As in `gpu_of`. Also if no PLL gives the clocks, or a frame takes longer than the display leaves. Also
-        if the bitstream is of another design, or has too little room.
+        As in `gpu_of` and `loader_of`. If no PLL gives the clocks, or a frame takes longer than the display
+        leaves. If the drawing does not fit the memories, or the bitstream is of another design.
     """
     gpu, scenes = gpu_of(board, mesh, given, colours)
     try:
@@ -93,11 +101,16 @@ def planned(
     except NoClockPlan as error:
         raise InputError(f"--clock {clock:g}", str(error), "give another rate") from error
     _check_load(gpu, plan)
+    first = gpu if made_for is None else gpu_of(board, made_for, given, colours)[0]
+    room = first.drawing.room
     if source is not None:
-        source.check_facts(facts_of(board, gpu, plan))
+        loaded = gpu if loader is None else loader_of(gpu, plan, loader, mesh, gpu, room)
+        source.check_facts(facts_of(board, loaded, plan))
         source.check_room(mesh, gpu.drawing)
-    drawing = gpu.drawing.padded(gpu.drawing.room if source is None else source.room)
-    return replace(gpu, drawing=drawing), scenes, plan
+        room = source.room
+    if loader is not None:
+        return loader_of(gpu, plan, loader, mesh, first, room), scenes, plan
+    return replace(gpu, drawing=gpu.drawing.padded(room)), scenes, plan
 
 
 def bitstream_of(board: Board, gpu: Gpu, plan: ClockPlan, seeds: int) -> Built:
@@ -185,6 +198,10 @@ def design_lines(board: Board, mesh: str, gpu: Gpu, plan: ClockPlan) -> Iterator
     yield f"{'display':<12}640x480 at 60 Hz, bands of {buffer.lines} lines, RGB{bits}"
     rates = ", ".join(f"{name} {float(rate) / 1e6:.6g} MHz" for name, rate in plan.rates.items())
     yield f"{'clocks':<12}{rates}"
+    if (loader := gpu.loader) is not None:
+        sources = [f"serial line at {BAUD / 1e6:g} Mbaud"] if loader.uart else []
+        sources += [f"flash at {loader.flash.offset:#x}"] if loader.flash else []
+        yield f"{'loader':<12}{', '.join(sources)}"
 
 
 def _surface(albedo: Albedo) -> str:

@@ -10,6 +10,7 @@ from amaranth.lib import io
 from amaranth.lib.wiring import Component
 from scipy.spatial.transform import Rotation
 
+from blysk.bench.tools.board_loader import connect_loader
 from blysk.bench.tools.board_options import COLOURS, DEFAULTS
 from blysk.bench.tools.boards import Board
 from blysk.golden.albedo.texel_memory import BANKS
@@ -247,7 +248,8 @@ class BoardTop(Elaboratable):
     board : Board
         The board.
     gpu : Component
-        A `GpuUnit`, or another component with ``pairs``, and with ``buttons`` if the top has buttons.
+        A `GpuUnit`, or another component with ``pairs``, and with ``buttons`` if the top has buttons. It may
+        have members of `loader_members`.
     plan : ClockPlan
         Clocks made from the board's clock.
     """
@@ -256,7 +258,7 @@ class BoardTop(Elaboratable):
         self.board, self.gpu, self.plan = board, gpu, plan
 
     def elaborate(self, platform):
-        """Request the pins: clock, lanes of the connector ``hdmi``, buttons."""
+        """Request the pins: clock, lanes of the connector ``hdmi``, buttons, pins of a loader."""
         m = Module()
         clock = platform.request(platform.default_clk, dir="-")
         m.submodules.clock = buffer = io.Buffer("i", clock)
@@ -276,4 +278,5 @@ class BoardTop(Elaboratable):
             buttons.append(button.i)
         if buttons:
             m.d.comb += pressed.eq(Cat(buttons))
+        connect_loader(m, platform, self.board, gpu)
         return m

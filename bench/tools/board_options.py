@@ -3,10 +3,13 @@
 from blysk.golden.video.band_buffer import RGB565, RGB888
 from blysk.sim.api.options import DESIGN, SCENE
 
-__all__ = ["COLOURS", "DEFAULTS", "OPTIONS"]
+__all__ = ["COLOURS", "DEFAULTS", "LOADERS", "OPTIONS"]
 
 COLOURS = {"rgb565": RGB565, "rgb888": RGB888}
 """Pixel formats of the band buffer."""
+
+LOADERS = ("uart", "flash", "both")
+"""Sources of a loader's bytes."""
 
 _LEFT_OUT = ("size", "projection", "viewer", "target", "operand", "gate", "setup_interval", "style")
 

@@ -34,6 +34,8 @@ class Board:
         Lines of a band. The memory of the device limits this number.
     loader : str
         Name of the board for openFPGALoader.
+    flash : str
+        Name of the flash's resource.
     compact : bool
         Whether the device is small. A small device gets geometry of compact style. It gets setup interval 9
         if the method has this interval.
@@ -53,6 +55,7 @@ class Board:
     multipliers: int
     lines: int
     loader: str
+    flash: str
     compact: bool
     known: str
 
@@ -89,6 +92,7 @@ BOARDS = {
             multipliers=28,
             lines=8,
             loader="ulx3s",
+            flash="spi_flash",
             compact=True,
             known="made on commit fa18bce by the first placement, with 19,148 of 24,288 look-up tables and "
             "all 56 block RAMs. It took 15 minutes of one core, and meets every clock",
@@ -103,6 +107,7 @@ BOARDS = {
             multipliers=156,
             lines=16,
             loader="ulx3s",
+            flash="spi_flash",
             compact=False,
             known="not placed with quotient so far. Mapped on commit 9968b26, with a texture of 64x64: "
             "28,962 of 83,640 look-up tables and 137 of 208 block RAMs. On commit c815b08 an earlier method "
@@ -118,6 +123,7 @@ BOARDS = {
             multipliers=28,
             lines=8,
             loader="icepi-zero",
+            flash="spi_flash_1x",
             compact=True,
             known="not tried with quotient so far. On commit c815b08 an earlier method gave a bitstream. The "
             "same device on an ulx3s-25f has a bitstream of commit fa18bce",
