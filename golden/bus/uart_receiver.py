@@ -58,7 +58,8 @@ class UartReceiver:
         """
         middles = (self.divisor // 2 + self.divisor * np.arange(_BITS)) >> FRACTION_BITS
         zeros, ones = (np.flatnonzero(np.asarray(levels) == level) for level in (0, 1))
-        found, errors, cycle = [], 0, 0
+        found: list[int] = []
+        errors = cycle = 0
         while True:
             start = _next(zeros, cycle)
             if start is None or start + middles[0] >= len(levels):

@@ -1,0 +1,57 @@
+# amaranth: UnusedElaboratable=no
+"""Memories that are written: each unit then gives the words of the other memory."""
+
+import numpy as np
+
+from blysk.bench.units.video.meshes import any_memory
+from blysk.golden.video.draw_commands import COMMAND_BITS, DrawCommands
+from blysk.golden.video.motion import ENTRIES, Motion
+from blysk.hdl.video.draw_commands import DrawCommandsUnit
+from blysk.hdl.video.mesh_memory import MeshMemoryUnit
+from blysk.hdl.video.motion import MotionUnit
+from blysk.sim.engines.simulate import simulate
+
+
+def writes(words, width):
+    """Beats that write words from address 0 on."""
+    size = -(-width // 8)
+    data = np.frombuffer(b"".join(word.to_bytes(size, "little") for word in words), dtype=np.uint8)
+    return {"address": np.arange(len(words)), "data": data.reshape(-1, size)}
+
+
+def run(unit, beats, write, count):
+    return simulate(unit, beats, write=write, count=count, engine="pysim").beats
+
+
+def test_vertices():
+    old, new = any_memory(9, 5), any_memory(9, 5, seed=1)
+    write = writes(new.vertex_words, new.vertex_bits)
+    found = run(MeshMemoryUnit(old, True), {"first": np.array([0]), "count": np.array([9])}, write, 9)
+    np.testing.assert_array_equal(found["position"], new.position)
+    np.testing.assert_array_equal(found["normal"], new.normal)
+
+
+def test_commands():
+    rng = np.random.default_rng(3)
+    rows = [
+        np.c_[rng.integers(1, 5, 8), rng.integers(0, 512, 8), rng.integers(0, 4096, (8, 2))] for _ in "ab"
+    ]
+    old, new = (DrawCommands(np.r_[each, [[0, 0, 0, 0]]], (0,)) for each in rows)
+    write = writes(new.codes, COMMAND_BITS)
+    found = run(DrawCommandsUnit(old, True), {"start": np.array([0]), "first_band": np.array([1])}, write, 9)
+    np.testing.assert_array_equal(np.c_[[found[k] for k in ("kind", "index", "first", "count")]].T, new.words)
+
+
+def test_matrices():
+    rng = np.random.default_rng(4)
+    old, new = (
+        Motion(
+            rng.integers(-(1 << 24), 1 << 24, (1, ENTRIES)),
+            *rng.integers(-(1 << 17), 1 << 17, (2, 1, ENTRIES)),
+        )
+        for _ in "ab"
+    )
+    write = writes(new.words, Motion.WORD_BITS)
+    beats = {"slot": np.array([0]), "angle": np.array([777])}
+    found = run(MotionUnit(old, True), beats, write, ENTRIES)
+    np.testing.assert_array_equal(found["value"], new.compute(np.array(0), np.array(777)))
