@@ -58,7 +58,7 @@ def test_beat_of_the_guide():
             *(np.array([end @ axes.T]) for end in (left, right)), np.array([length])
         )
         for found, codes in zip(
-            made["beat"](left, right, length, light, viewer), tuple(expected), strict=True
+            made["beat"](left, right, length, light, viewer), tuple(expected)[:3], strict=True
         ):
             np.testing.assert_allclose(found, codes[0], rtol=0, atol=1)
         assert made["beat"](left, right, length, light, viewer)[2] == expected.exponent[0]

@@ -12,20 +12,17 @@ import sys
 from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import click
 import numpy as np
-from matplotlib.figure import Figure
-from matplotlib.patches import FancyBboxPatch
 
-from blysk.bench import accuracy
 from blysk.bench.command import run
-from blysk.bench.report.placed import placed
-from blysk.bench.svg import panels
-from blysk.bench.tools.families import DEVICE
 from blysk.sim.errors import InputError
 from blysk.sim.output import atomic_writer, check_writable, write_json
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
 
 __all__ = [
     "cited",
@@ -163,6 +160,11 @@ def methods_of(points: Sequence[Mapping[str, Any]]) -> list[dict[str, Any]]:
     ValueError
         If a method was not measured.
     """
+    # These imports take a second, and bad arguments are told without them.
+    from blysk.bench import accuracy
+    from blysk.bench.report.placed import placed
+    from blysk.bench.tools.families import DEVICE
+
     store = placed(DEVICE)
     rows = []
     for point in points:
@@ -241,6 +243,7 @@ def lights_of(methods: Sequence[str] = OF_LIGHTS, counts: Sequence[int] = LIGHTS
 
 def exponents_of(triangles: int, width: int, height: int) -> dict[str, Any]:
     """Largest errors and bounds of `quotient` over the exponent, off the border of the light."""
+    from blysk.bench import accuracy
     from blysk.golden.presets import preset
     from blysk.sim.meshes.teapot import teapot
 
@@ -251,11 +254,13 @@ def exponents_of(triangles: int, width: int, height: int) -> dict[str, Any]:
     return {"triangles": len(mesh.faces), "size": f"{width}x{height}", **found}
 
 
-def _write(figure: Figure, path: Path) -> None:
+def _write(figure: "Figure", path: Path) -> None:
     figure.savefig(path, metadata={"CreationDate": None})
 
 
 def _draw_exponents(path: Path, found: Mapping[str, Any]) -> None:
+    from blysk.bench.svg import panels
+
     figure, (axes,) = panels(3.4, 2.1)
     for model, color in (("blinn", "#0072b2"), ("phong", "#b0508a")):
         errors, bounds = np.array(found[model], dtype=float).T
@@ -268,6 +273,8 @@ def _draw_exponents(path: Path, found: Mapping[str, Any]) -> None:
 
 
 def _draw_front(path: Path, rows: Sequence[Mapping[str, Any]]) -> None:
+    from blysk.bench.svg import panels
+
     figure, (axes,) = panels(3.4, 2.6)
     places = Counter()
     for row in rows:
@@ -285,6 +292,10 @@ def _draw_front(path: Path, rows: Sequence[Mapping[str, Any]]) -> None:
 
 
 def _draw_pipeline(path: Path) -> None:
+    from matplotlib.patches import FancyBboxPatch
+
+    from blysk.bench.svg import panels
+
     figure, (axes,) = panels(7, 1.1)
     axes.set(xlim=(0, len(_STAGES)), ylim=(0, 1))
     axes.axis("off")

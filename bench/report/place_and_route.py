@@ -132,9 +132,9 @@ def _committed() -> tuple[list[str], list[Table]]:
                 for name in ("design", "device", "luts", "flip_flops", "multipliers", "block_rams")
             ),
             *(
-                min(entry["fmax_mhz"]),
-                median(entry["fmax_mhz"]),
-                max(entry["fmax_mhz"]),
+                min(entry["fmax_mhz"], default=None),
+                median(entry["fmax_mhz"]) if entry["fmax_mhz"] else None,
+                max(entry["fmax_mhz"], default=None),
                 len(entry["fmax_mhz"]),
             ),
             *(entry["date"], entry["command"]),

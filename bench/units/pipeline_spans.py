@@ -243,7 +243,7 @@ def vectors_for(rng: np.random.Generator, design: ShadingPipeline, length: np.nd
 
 def with_lines(design: ShadingPipeline, spans: Spans, constants: list[FrameConstants]) -> Spans:
     """Spans with the lines that a pipeline with several lanes takes, from the constants of each material."""
-    if not design.interpolator.pairs or design.specular is None or not design.lights:
+    if design.build.lanes == 1 or design.specular is None or not design.lights:
         return spans
     direction = np.stack([of.direction[:, ::2] for of in constants])[spans.material]
     return replace(spans, vectors=design.interpolator.with_lines(spans.vectors, direction, True))

@@ -102,7 +102,8 @@ class Design(pipeline.ShadingPipeline):
         """Figures of `DesignCost` from the committed placement of this design; empty if there is none."""
         shading = replace(self, build=self.build.shading)
         for entry in read_store():
-            words = design_of(entry["design"])
+            # Devices that were only mapped have no clock rate.
+            words = design_of(entry["design"]) if entry["fmax_mhz"] else None
             if words is None or words[:2] != (self.method, self.model):
                 continue
             operand: Any = next((word for word in words[2:] if word in get_args(Operand)), None)

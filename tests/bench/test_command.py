@@ -114,7 +114,7 @@ def test_help_and_refused_arguments_load_nothing_heavy(tmp_path):
     done = subprocess.run(
         [sys.executable, "-c", QUICK, *refused], cwd=tmp_path, capture_output=True, text=True, check=True
     )
-    commands = "absorb bench blocks board explore fpga pages render verilog web"
+    commands = "absorb bench blocks board explore fpga pages render send verilog web"
     assert done.stdout == f"{commands} {{0}} {{2}} set() {len(refused)}\n"
     assert [path.name for path in tmp_path.iterdir()] == ["file"]
 

@@ -49,6 +49,8 @@ PARTS = {
     "DisplayUnit": "bands to a monitor, in the GPU",
     "DrawUnit": "a mesh to bands, in the GPU",
     "GpuUnit": "a mesh to a monitor",
+    "FlashReaderUnit": "pins of a flash, no stream at the input",
+    "LoaderUnit": "a receiver, a flash reader and a decoder, in the GPU",
 }
 # Units with every kind of cell that are quickly measured.
 FEW_ENTRIES = [

@@ -97,7 +97,7 @@ def test_vectors_and_constants_of_quotient_are_those_of_python(model, monkeypatc
         exponents=[1, 2, 100, 999, 1000],
     )
     for scene, of_script in zip(scenes, found, strict=True):
-        start, step, exponent = tuple(web_data.with_vectors(some, scene, design).vectors)
+        start, step, exponent, *_ = tuple(web_data.with_vectors(some, scene, design).vectors)
         np.testing.assert_array_equal(of_script["vectors"], [*start.T, *step.T, exponent])
         (constants,) = constants_of(scene, design)
         for name in ("direction", "halfway", "diffuse", "specular"):
