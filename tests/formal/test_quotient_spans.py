@@ -237,7 +237,7 @@ def test_overwritten_differences_are_found(refute, inject):
 
     Without it a claim is refuted.
     """
-    inject(QuotientSpansUnit, "_set_up", "(arrives & first[1]) | ", "")
+    inject(QuotientSpansUnit, "_set_up", "(at_coarse[0] & first[1]) | ", "")
     refute(of_waiting(), 30)
 
 
