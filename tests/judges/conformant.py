@@ -11,6 +11,8 @@ import numpy as np
 import pytest
 
 STEPS = 256
+SRGB_CODES, SRGB_TEXELS, ENCODES = 0x8C43, 0x8C41, 0x8DB9
+"""OpenGL's SRGB8_ALPHA8, SRGB8 and FRAMEBUFFER_SRGB."""
 MISSING = "no OpenGL by EGL: install the extra `judges`, and Debian's libegl1, libgl1 and libgl1-mesa-dri"
 
 COVER = (
@@ -116,7 +118,7 @@ class Look:
     mirror: bool = False
     """Whether the highlight is (R·V)^n in place of (N·H)^n."""
     image: np.ndarray | None = None
-    """Texels in linear light, shape (rows, columns, 3)."""
+    """Texels, shape (rows, columns, 3): linear light, or uint8 codes of sRGB, which OpenGL decodes."""
 
 
 class Conformant:
@@ -180,7 +182,7 @@ class Conformant:
             one.release()
         return np.moveaxis(found, -1, 0).astype(np.int64)
 
-    def picture(self, places, w, nearness, normals, look, size, coordinates=None):
+    def picture(self, places, w, nearness, normals, look, size, coordinates=None, encoded=False):
         """Colours 0 to 1 of the nearest triangles, their indices and N·L, at every pixel.
 
         OpenGL clips triangles at its borders, and rounds the corners of a cut. This moves edges by up to a
@@ -200,6 +202,9 @@ class Conformant:
             Columns and rows.
         coordinates : float array, shape (T, 3, 2), optional
             Texture coordinates.
+        encoded : bool
+            Whether the frame buffer has 8-bit codes of sRGB, which OpenGL encodes and rounds. Colours are
+            then these codes over 255.
 
         Returns
         -------
@@ -224,21 +229,26 @@ class Conformant:
         array = context.vertex_array(
             self.shade, [(buffer, "4f 3f 2f 1f", "place", "normal", "texel", "face")]
         )
-        textures = [context.texture(size, parts, dtype="f4") for parts in (4, 2)]
+        kind = {"dtype": "f1", "internal_format": SRGB_CODES} if encoded else {"dtype": "f4"}
+        textures = [context.texture(size, 4, **kind), context.texture(size, 2, dtype="f4")]
         frame = context.framebuffer(textures, context.depth_texture(size))
         image = self._set(look)
         frame.use()
         context.viewport = (0, 0, *size)
         context.clear(-1.0, -1.0, -1.0, -1.0, depth=1.0)
         context.enable(context.DEPTH_TEST)
+        (context.enable_direct if encoded else context.disable_direct)(ENCODES)
         array.render(context.TRIANGLES)
         color, told = (
-            np.frombuffer(of.read(), "f4").reshape(size[1], size[0], -1)[middle].astype(np.float64)
+            np.frombuffer(of.read(), of.dtype.replace("f1", "u1"))
+            .reshape(size[1], size[0], -1)[middle]
+            .astype(np.float64)
             for of in textures
         )
         for one in (array, frame, *textures, buffer, *image):
             one.release()
-        return color[..., :3], told[..., 0].astype(np.int64), told[..., 1]
+        color = color[..., :3] / (255 if encoded else 1)
+        return color, told[..., 0].astype(np.int64), told[..., 1]
 
     def _set(self, look):
         """Set the values of the program. Returns the texture, if there is any."""
@@ -249,6 +259,10 @@ class Conformant:
             return []
         rows, columns = look.image.shape[:2]
         self.shade["size"] = columns, rows
-        image = self.context.texture((columns, rows), 3, look.image.astype("f4").tobytes(), dtype="f4")
+        kind = {"dtype": "f4"}
+        if look.image.dtype == np.uint8:
+            kind = {"dtype": "f1", "internal_format": SRGB_TEXELS}
+        texels = look.image.astype(kind["dtype"].replace("f1", "u1")).tobytes()
+        image = self.context.texture((columns, rows), 3, texels, **kind)
         image.use()
         return [image]
