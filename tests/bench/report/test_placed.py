@@ -24,12 +24,12 @@ def test_table_of_the_guide_is_the_store():
     """Every row of a pipeline has the figures of the store: parts, and a clock rate for each seed."""
     store = {entry["design"]: entry for entry in read_store() if entry["device"] == DEVICE}
     rows = re.findall(
-        r"^\| `([\w-]+)`, `(\w+)`(, 1 - N·H)? \| ([\d,]+) \| ([\d,]+) \| (\d+) \| (\d+) \| ([\d, ]+\d)",
+        r"^\| `([\w-]+)`, `(\w+)`(, 1 - N·H)?(, interval \d)? \| ([\d,]+) \| ([\d,]+) \| (\d+) \| (\d+) \| ([\d, ]+\d)",
         GUIDE.read_text(encoding="utf-8"),
         re.MULTILINE,
     )
-    for method, model, other, *parts, rates in rows:
-        entry = store[f"pipeline {method}, {model}, 1 light{', one_minus_cosine' * bool(other)}"]
+    for method, model, other, interval, *parts, rates in rows:
+        entry = store[f"pipeline {method}, {model}, 1 light{', one_minus_cosine' * bool(other)}{interval}"]
         shown = [int(part.replace(",", "")) for part in parts]
         assert shown == [entry[name] for name in ("luts", "flip_flops", "multipliers", "block_rams")], entry
         assert [int(rate) for rate in rates.split(", ")] == sorted(map(round, entry["fmax_mhz"])), entry
@@ -92,8 +92,15 @@ def test_names():
         "specular",
         "pipeline quotient, blinn, 2 lights",
         "pipeline quotient, blinn, 1 light, compact",
+        "pipeline renormalise, exp, 1 light, interval 4",
     ):
         assert design_of(other) is None
+
+
+def test_names_have_the_interval_of_the_command():
+    """Else a placement would stand for the design with the usual interval."""
+    of_command = [re.findall(r"--setup-interval (\d+)", entry["command"]) for entry in read_store()]
+    assert [re.findall(r", interval (\d+)", entry["design"]) for entry in read_store()] == of_command
 
 
 def test_committed_store():
