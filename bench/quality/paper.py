@@ -5,31 +5,28 @@ the drawings beside a copy of ``docs/paper/paper.typ``, and compiles the copy wi
 """
 
 import json
-import math
 import re
 import shutil
 import sys
-from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import click
-import numpy as np
 
 from blysk.bench.command import run
 from blysk.sim.errors import InputError
 from blysk.sim.output import atomic_writer, check_writable, write_json
 
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
-
 __all__ = [
+    "beside",
+    "checkers_of",
     "cited",
     "data_of",
     "documents_table",
     "exponents_of",
     "lights_of",
+    "measured_of",
     "methods_of",
     "paper",
     "reference_texts",
@@ -46,19 +43,6 @@ SHOWN = 1, 2, 3, 10, 30, 100, 300, 1000
 """Exponents in the drawing of errors and bounds."""
 EXPONENT = 100
 """Exponent of the table of methods."""
-
-_STAGES = (
-    ("span\nv, d, e", 0),
-    ("squares,\nlines", 5),
-    ("sums\nm, w, l", 0),
-    ("1/sqrt(q)\ntable, r²", 2),
-    ("l r\nm r²", 2),
-    ("lobe(s)\ntable", 1),
-    ("colours", 6),
-    ("rounding,\nsRGB", 0),
-    ("pixel", 0),
-)
-"""Text and multipliers of each box in the drawing of the datapath, from left to right."""
 
 
 def cited(text: str) -> list[str]:
@@ -96,13 +80,13 @@ def reference_texts(keys: Sequence[str], page: str) -> Iterator[dict[str, str]]:
 
     Raises
     ------
-    ValueError
+    InputError
         If the page has no entry of a key.
     """
     entries = dict(re.findall(r"^### \[(\w+)\]\n\n(.*?)(?=\n\n|\Z)", page, re.MULTILINE | re.DOTALL))
     for key in keys:
         if key not in entries:
-            raise ValueError(f"the paper cites {key}, and docs/theory/references.md has no entry of this key")
+            raise InputError(f"[{key}]", "docs/theory/references.md has no entry of it", "write the entry")
         yield {"key": key, "text": _typst(entries[key])}
 
 
@@ -123,12 +107,12 @@ def documents_table(page: str, first: str) -> dict[str, Any]:
 
     Raises
     ------
-    ValueError
+    InputError
         If the page has no such table.
     """
     _, found, rest = page.partition(f"\n{first}")
     if not found:
-        raise ValueError(f"no table begins with {first!r}")
+        raise InputError(first, "no table of the page begins with this line", "name the table's first line")
     lines = (found.strip() + rest).split("\n\n", 1)[0].splitlines()
     rows = [[_typst(cell.strip()) for cell in re.split(r"(?<!\\)\|", line)[1:-1]] for line in lines]
     return {"header": rows[0], "rows": rows[2:]}
@@ -140,8 +124,19 @@ def columns(table: Mapping[str, Any], *numbers: int) -> dict[str, Any]:
     return {"header": rows[0], "rows": rows[1:]}
 
 
+def checkers_of(table: Mapping[str, Any]) -> dict[str, float]:
+    """Largest errors and bounds of the floors with checkers, from a table of `documents_table`."""
+    rows = [row[1:] for row in table["rows"] if row[0].startswith("floor")]
+    names = "linear", "linear_bound", "srgb", "srgb_bound"
+    return {name: max(map(float, of)) for name, of in zip(names, zip(*rows, strict=True), strict=True)}
+
+
 def methods_of(points: Sequence[Mapping[str, Any]]) -> list[dict[str, Any]]:
     """Rows of the table of methods: those of the report at exponent `EXPONENT` on the teapot.
+
+    A method has a row with the highlight of the documents (``cosquad``) and its own operand, and a row in its
+    best form: with an exact table, and the operand 1 - N·H if it finds normals. Published variants, other
+    highlights, and ``cosquad`` with 1 - N·H in place of the method's N·H are left out.
 
     Parameters
     ----------
@@ -151,9 +146,9 @@ def methods_of(points: Sequence[Mapping[str, Any]]) -> list[dict[str, Any]]:
     Returns
     -------
     list of dict
-        ``method``, ``model``, ``error`` in LSB against exact normals with the same lobe, ``cycles`` a pixel,
-        ``multipliers``; ``luts``, ``flip_flops`` and ``mhz``, ``None`` without a placement. The smallest
-        error is first.
+        ``method``, ``model``, ``operand``, ``error`` in LSB against exact normals with the same lobe,
+        ``cycles`` a pixel, ``multipliers``; ``luts``, ``flip_flops``, ``mhz`` (the median) and ``seeds``,
+        ``None`` without a placement. The smallest error is first.
 
     Raises
     ------
@@ -161,37 +156,39 @@ def methods_of(points: Sequence[Mapping[str, Any]]) -> list[dict[str, Any]]:
         If a method was not measured.
     """
     # These imports take a second, and bad arguments are told without them.
-    from blysk.bench import accuracy
+    from blysk.bench.report.front import design_of
     from blysk.bench.report.placed import placed
     from blysk.bench.tools.families import DEVICE
+    from blysk.golden.presets import METHODS
 
     store = placed(DEVICE)
     rows = []
     for point in points:
         settings = point["settings"]
-        words = (settings["method"], settings["model"]) if "method" in settings else None
-        shown = words in accuracy.DESIGNS and words[1] in ("blinn", "phong", "cosquad")
-        if not shown or settings["exponent"] != EXPONENT or settings["source"] != "teapot":
+        if settings["exponent"] != EXPONENT or settings["source"] != "teapot" or "lanes" in settings:
             continue
-        if "operand" in settings:
+        method, model = settings["method"], settings.get("model")
+        documented = model == "cosquad" and "operand" not in settings
+        if method not in METHODS or not (documented or model in ("blinn", "phong")):
             continue
-        parts = store.get(words, {})
+        parts = store.get(design_of(settings), {})
         rows.append(
             {
-                "method": words[0],
-                "model": words[1],
+                "method": method,
+                "model": model,
+                "operand": settings.get("operand", METHODS[method].operand),
                 "error": point["errors"]["method_max_lsb"],
                 "cycles": point["times"]["cycles_per_pixel"],
                 "multipliers": point["hardware"]["multipliers"],
                 "luts": parts.get("luts"),
                 "flip_flops": parts.get("flip_flops"),
                 "mhz": round(parts["fmax_median_mhz"]) if parts else None,
+                "seeds": len(parts["fmax_mhz"]) if parts else None,
             }
         )
-    if not {("quotient", "blinn"), ("renormalise", "blinn")} <= {
-        (row["method"], row["model"]) for row in rows
-    }:
-        raise ValueError(f"quotient and renormalise with blinn at exponent {EXPONENT} are not in the report")
+    lacking = {(method, "blinn") for method in METHODS} - {(row["method"], row["model"]) for row in rows}
+    if lacking:
+        raise ValueError(f"has no {min(lacking)[0]} with blinn at exponent {EXPONENT}")
     return sorted(rows, key=lambda row: (row["error"], row["cycles"]))
 
 
@@ -207,37 +204,121 @@ def rivals_of(tables: Mapping[str, Mapping[str, Any]]) -> dict[str, Any]:
     -------
     dict
         ``meshes``, and ``rows`` with ``method``, ``multipliers`` with one light and with the most lights,
-        ``adders`` in bits, ``errors`` in LSB before rounding on each mesh. ``most`` is the number of lights.
+        ``adders`` in bits, ``netlist`` multipliers with one light or ``None``, and ``errors`` in LSB before
+        rounding and ``cycles`` a pixel on each mesh. ``most`` is the number of lights.
     """
     parts, errors = tables["rivals-parts"]["rows"], tables["rivals-errors"]["rows"]
     most = max(row["lights"] for row in parts)
     found = {(row["method"], row["lights"]): row for row in parts}
-    largest: dict[str, dict[str, float]] = {}
+    of_mesh: dict[str, dict[str, Mapping[str, Any]]] = {}
     for row in errors:
         if row["exponent"] == EXPONENT:
-            largest.setdefault(row["method"], {})[row["mesh"]] = row["largest error before rounding, LSB"]
-    meshes = list(next(iter(largest.values())))
+            of_mesh.setdefault(row["method"], {})[row["mesh"]] = row
+    meshes = list(next(iter(of_mesh.values())))
     rows = [
         {
             "method": name,
             "multipliers": [found[name, count]["multipliers"] for count in (1, most)],
             "adders": found[name, 1]["adders, bits"],
-            "errors": [largest[name][mesh] for mesh in meshes],
+            "netlist": found[name, 1]["multipliers of the netlist"],
+            "errors": [of[mesh]["largest error before rounding, LSB"] for mesh in meshes],
+            "cycles": [of[mesh]["cycles a pixel"] for mesh in meshes],
         }
-        for name in largest
+        for name, of in of_mesh.items()
     ]
     return {"meshes": meshes, "most": most, "rows": rows}
 
 
+PRINTED = {"error": 2, "cycles": 3, "multipliers": 0, "luts": 0}
+"""Digits of the table of methods. Methods are compared by what the table shows."""
+
+
+def beside(rows: Sequence[Mapping[str, Any]], own: Mapping[str, Any]) -> dict[str, dict[str, list[str]]]:
+    """Methods that have less than a design, or the same.
+
+    Parameters
+    ----------
+    rows : sequence of dict
+        Rows of `methods_of`.
+    own : dict
+        The design's row.
+
+    Returns
+    -------
+    dict
+        For each number of `PRINTED`: ``less`` and ``same``, names of methods, each once. A method counts in
+        each of its forms. Further forms of the design's own method have their highlight in the name.
+    """
+    found = {}
+    for part, digits in PRINTED.items():
+        names: dict[str, list[str]] = {"less": [], "same": []}
+        for row in rows:
+            if row is own or row[part] is None:
+                continue
+            value, limit = (round(of[part], digits) for of in (row, own))
+            of_own = row["method"] == own["method"]
+            name = f"{row['method']}, {row['model']}" if of_own else row["method"]
+            if value <= limit:
+                names["less" if value < limit else "same"].append(name)
+        less = list(dict.fromkeys(names["less"]))
+        found[part] = {"less": less, "same": [n for n in dict.fromkeys(names["same"]) if n not in less]}
+    return found
+
+
+def measured_of(report: Mapping[str, Any]) -> dict[str, Any]:
+    """The figures that the paper takes from a report.
+
+    Parameters
+    ----------
+    report : dict
+        Content of a report's ``report.json``.
+
+    Raises
+    ------
+    ValueError
+        If this is no report, or the report lacks a section or a method.
+    """
+    try:
+        points = report["sections"]["points"]["figures"]["points"]
+        methods = methods_of(points)
+        settings = next(p["settings"] for p in points if p["settings"]["source"] == "teapot")
+        versions = report["versions"]
+        return {
+            "version": versions["blysk"],
+            "made": report["made"][:10],
+            "tools": ", ".join(f"{name} {versions[name]}" for name in ("Python", "amaranth", "numpy")),
+            "methods": methods,
+            "engines": sorted({p["settings"]["engine"] for p in points if p["group"] != "software"}),
+            "scene": {
+                "triangles": settings["triangles"],
+                "size": f"{settings['width']}x{settings['height']}",
+                "exponent": EXPONENT,
+            },
+            "rivals": rivals_of(report["sections"]["rivals"]["tables"]),
+        }
+    except (KeyError, TypeError, StopIteration):
+        raise ValueError("is not such a report") from None
+
+
 def lights_of(methods: Sequence[str] = OF_LIGHTS, counts: Sequence[int] = LIGHTS) -> dict[str, Any]:
-    """Multipliers of methods with the lobe `blinn` over the number of lights, counted in the netlist."""
+    """Multipliers of methods with the lobe `blinn` over the number of lights, counted in the netlist.
+
+    ``counts`` are the numbers of lights. ``rows`` have ``method``, the setup ``interval``, ``multipliers`` of
+    each count, and ``widest``: bits of the widest operand of a multiplier.
+    """
     from blysk.sim.api.design import design
 
     rows = []
     for method in methods:
         costs = [design(method=method, model="blinn", lights=count).cost() for count in counts]
-        multipliers = [cost.multipliers for cost in costs]
-        rows.append({"method": method, "interval": costs[0].setup_interval, "multipliers": multipliers})
+        rows.append(
+            {
+                "method": method,
+                "interval": costs[0].setup_interval,
+                "multipliers": [cost.multipliers for cost in costs],
+                "widest": max(wide for cost in costs for wide, _ in cost.multiplier_widths),
+            }
+        )
     return {"counts": list(counts), "rows": rows}
 
 
@@ -254,157 +335,86 @@ def exponents_of(triangles: int, width: int, height: int) -> dict[str, Any]:
     return {"triangles": len(mesh.faces), "size": f"{width}x{height}", **found}
 
 
-def _write(figure: "Figure", path: Path) -> None:
-    figure.savefig(path, metadata={"CreationDate": None})
-
-
-def _draw_exponents(path: Path, found: Mapping[str, Any]) -> None:
-    from blysk.bench.svg import panels
-
-    figure, (axes,) = panels(3.4, 2.1)
-    for model, color in (("blinn", "#0072b2"), ("phong", "#b0508a")):
-        errors, bounds = np.array(found[model], dtype=float).T
-        axes.plot(SHOWN, errors, "o-", color=color, markersize=3, linewidth=1, label=f"{model}: found")
-        axes.plot(SHOWN, bounds, "--", color=color, linewidth=1, label=f"{model}: bound")
-    axes.set(xscale="log", xlabel="exponent n", ylabel="error, LSB")
-    axes.axhline(0.5, color="#999999", linewidth=0.8)
-    axes.legend(fontsize=7, frameon=False)
-    _write(figure, path)
-
-
-def _draw_front(path: Path, rows: Sequence[Mapping[str, Any]]) -> None:
-    from blysk.bench.svg import panels
-
-    figure, (axes,) = panels(3.4, 2.6)
-    places = Counter()
-    for row in rows:
-        color = "#0072b2" if row["method"] == "quotient" else "#444444"
-        place = row["cycles"], row["error"]
-        axes.plot(*place, "o", color=color, markersize=3)
-        near = tuple(round(math.log(value), 1) for value in place)
-        text, shift = f"{row['method']}, {row['model']}", (4, 1 + 7 * places[near])
-        axes.annotate(text, place, shift, textcoords="offset points", fontsize=5.5, color=color)
-        places[near] += 1
-    axes.set(xscale="log", yscale="log", xlabel="cycles a pixel", ylabel="largest error, LSB")
-    axes.axhline(0.5, color="#999999", linewidth=0.8)
-    axes.margins(x=0.3, y=0.1)
-    _write(figure, path)
-
-
-def _draw_pipeline(path: Path) -> None:
-    from matplotlib.patches import FancyBboxPatch
-
-    from blysk.bench.svg import panels
-
-    figure, (axes,) = panels(7, 1.1)
-    axes.set(xlim=(0, len(_STAGES)), ylim=(0, 1))
-    axes.axis("off")
-    for k, (text, multipliers) in enumerate(_STAGES):
-        face = "#f9d9b8" if multipliers else "#eef1f4"
-        box = FancyBboxPatch(
-            (k + 0.1, 0.3), 0.74, 0.62, "round,pad=0.02", facecolor=face, edgecolor="#35506b"
-        )
-        axes.add_patch(box)
-        axes.text(k + 0.47, 0.61, text, ha="center", va="center", fontsize=7)
-        if multipliers:
-            axes.text(k + 0.47, 0.1, str(multipliers), ha="center", va="center", fontsize=7)
-        if k:
-            arrow = {"arrowstyle": "->", "color": "#35506b"}
-            axes.annotate("", (k + 0.1, 0.61), (k - 0.14, 0.61), arrowprops=arrow)
-    _write(figure, path)
-
-
-def data_of(report: Mapping[str, Any]) -> dict[str, Any]:
-    """All figures of the paper except those that `paper` measures.
+def data_of(measured: Mapping[str, Any]) -> dict[str, Any]:
+    """All figures of the paper: those of a report, and those of the project's pages.
 
     Parameters
     ----------
-    report : dict
-        Content of a report's ``report.json``.
+    measured : dict
+        Result of `measured_of`, with ``exponents`` and ``lights`` of `exponents_of` and `lights_of`.
 
     Raises
     ------
-    ValueError
-        If the report or a page lacks something.
+    InputError
+        If a page lacks something.
     """
-    points = report["sections"]["points"]["figures"]["points"]
-    methods = methods_of(points)
+    from blysk.sim.meshes.teapot import teapot
+
+    methods = measured["methods"]
     named = {(row["method"], row["model"]): row for row in methods}
-    settings = next(p["settings"] for p in points if p["settings"]["source"] == "teapot")
-    citation = (PROJECT / "CITATION.cff").read_text(encoding="utf-8")
-    pages = PROJECT / "docs"
-    guide = {
-        name: (pages / "guide" / f"{name}.md").read_text(encoding="utf-8")
-        for name in ("accuracy", "checked", "fpga")
-    }
-    theory = {
-        name: (pages / "theory" / f"{name}.md").read_text(encoding="utf-8")
-        for name in ("geometry", "quotient", "references")
-    }
-    other, own = named["renormalise", "blinn"], named["quotient", "blinn"]
+    own, other = named["quotient", "blinn"], named["renormalise", "blinn"]
+    guide, theory = (
+        {name: (PROJECT / "docs" / folder / f"{name}.md").read_text(encoding="utf-8") for name in names}
+        for folder, names in (
+            ("guide", ("accuracy", "checked", "fpga")),
+            ("theory", ("geometry", "quotient", "references", "textures")),
+        )
+    )
     return {
+        **measured,
         "title": "Phong and Blinn shading without unit normals: an open datapath with bounded errors",
-        "author": re.search(r"- name: (.*)", citation)[1],
-        "version": report["versions"]["blysk"],
-        "made": report["made"][:10],
-        "tools": ", ".join(f"{name} {report['versions'][name]}" for name in ("Python", "amaranth", "numpy")),
+        "author": re.search(r"- name: (.*)", (PROJECT / "CITATION.cff").read_text(encoding="utf-8"))[1],
+        "scene": measured["scene"] | {"triangles": len(teapot(measured["scene"]["triangles"]).faces)},
         "design": own,
-        "methods": methods,
-        "renormalise_more": other["multipliers"] - own["multipliers"],
-        "renormalise_cycles": other["cycles"],
-        "scene": {
-            "triangles": settings["triangles"],
-            "size": f"{settings['width']}x{settings['height']}",
-            "exponent": EXPONENT,
-        },
-        "rivals": rivals_of(report["sections"]["rivals"]["tables"]),
+        "renormalise": other,
+        "mirror": named["quotient", "phong"],
+        "beside": beside(methods, own),
         "all_spans": documents_table(theory["quotient"], "| spans of up to |"),
         "found_spans": documents_table(theory["quotient"], "| | n = 1 | n = 10 |"),
         "geometry": documents_table(theory["geometry"], "| spans from | `blinn`, n = 10 |"),
+        "checkers": checkers_of(
+            documents_table(theory["textures"], "| scene | linear light | bound | sRGB |")
+        ),
         "colours": columns(documents_table(guide["fpga"], "| `--albedo` | device |"), 0, 1, 2, 3, 4, 6, 7),
+        "more_lights": documents_table(guide["fpga"], "| lights | `quotient` | `renormalise` |"),
         "judges": documents_table(guide["checked"], "| judged | against llvmpipe |"),
         "worst": documents_table(guide["accuracy"], "| method | model | largest error of a pixel |"),
         "references": list(reference_texts(cited(SOURCE.read_text(encoding="utf-8")), theory["references"])),
     }
 
 
-def paper(
-    report: Mapping[str, Any],
-    folder: Path,
-    exponents: Mapping[str, Any],
-    lights: Mapping[str, Any],
-) -> bytes:
+def paper(data: Mapping[str, Any], folder: Path) -> bytes:
     """The paper as a PDF. Its text, data and drawings stay in a folder.
 
     Parameters
     ----------
-    report : dict
-        Content of a report's ``report.json``.
+    data : dict
+        Result of `data_of`.
     folder : Path
         Folder for the parts of the paper; it is made.
-    exponents, lights : dict
-        Results of `exponents_of` and `lights_of`.
 
     Raises
     ------
-    ValueError
-        If the report or a page lacks something.
     InputError
-        If the extra ``paper`` is not installed.
+        If the extra ``paper`` is not installed, or a sentence of the paper is untrue, see `check`.
     """
     try:
         import typst
     except ImportError:
         remedy = "install the extra paper, pip install -e '.[paper]'"
         raise InputError("typst", "the library that sets the paper is missing", remedy) from None
-    data = data_of(report) | {"exponents": dict(exponents), "lights": dict(lights)}
+    # Drawings need a library of another extra, and bad arguments are told without them.
+    from blysk.bench.quality.paper_claims import check
+    from blysk.bench.quality.paper_drawings import draw_exponents, draw_front, draw_pipeline
+
+    check(data, SOURCE.read_text(encoding="utf-8"))
     folder.mkdir(parents=True, exist_ok=True)
     shutil.copy(SOURCE, folder / SOURCE.name)
     shutil.copy(PROJECT / "docs" / "teapot.png", folder / "teapot.png")
     write_json(folder / "data.json", data)
-    _draw_exponents(folder / "exponents.pdf", exponents)
-    _draw_front(folder / "front.pdf", data["methods"])
-    _draw_pipeline(folder / "pipeline.pdf")
+    draw_exponents(folder / "exponents.pdf", data["exponents"], SHOWN)
+    draw_front(folder / "front.pdf", data["methods"])
+    draw_pipeline(folder / "pipeline.pdf")
     return typst.compile(folder / SOURCE.name, ignore_system_fonts=True)
 
 
@@ -419,23 +429,28 @@ def paper(
 )
 def _command(report: str, output: Path) -> None:
     """Make the paper from the report.json of a report that has the sections points and rivals."""
-    try:
-        read = json.loads(Path(report).read_text(encoding="utf-8"))
-        data_of(read)
-    except (OSError, ValueError, KeyError, TypeError) as error:
-        reason = (
-            str(error) if isinstance(error, ValueError) and "report" in str(error) else "is not such a report"
-        )
-        raise InputError(
-            report, reason, "give the report.json of `blysk bench --only points --only rivals`"
-        ) from None
+    measured = _read(report)
     check_writable(output)
-    size = data_of(read)["scene"]
-    width, height = map(int, size["size"].split("x"))
-    made = paper(read, output.parent, exponents_of(size["triangles"], width, height), lights_of())
+    scene = measured["scene"]
+    width, height = map(int, scene["size"].split("x"))
+    measured |= {"exponents": exponents_of(scene["triangles"], width, height), "lights": lights_of()}
+    made = paper(data_of(measured), output.parent)
     with atomic_writer(output) as path:
         path.write_bytes(made)
     click.echo(f"{'written':<12}{output}")
+
+
+def _read(report: str) -> dict[str, Any]:
+    """Figures of a file, see `measured_of`."""
+    remedy = "give the report.json of `blysk bench --only points --only rivals`"
+    try:
+        content = json.loads(Path(report).read_text(encoding="utf-8"))
+    except (OSError, ValueError):
+        raise InputError(report, "is not such a report", remedy) from None
+    try:
+        return measured_of(content)
+    except ValueError as error:
+        raise InputError(report, str(error), remedy) from None
 
 
 def main(arguments: Sequence[str] | None = None) -> int:

@@ -10,47 +10,97 @@ from blysk.bench.quality.paper import (
     OF_LIGHTS,
     SHOWN,
     SOURCE,
+    beside,
+    checkers_of,
     cited,
     columns,
     data_of,
     documents_table,
     main,
+    measured_of,
     methods_of,
     paper,
     reference_texts,
     rivals_of,
 )
+from blysk.golden.presets import METHODS
+from blysk.sim.api.placed import read_store
+from blysk.sim.errors import InputError
+
+FORMS = [("quotient", "blinn"), ("quotient", "phong"), ("renormalise", "cosquad")]
+FORMS += [(method, "blinn") for method in METHODS if method != "quotient"]
+"""Method and model of the made-up points."""
 
 
-def point(method, model, error, cycles, exponent=100):
+def point(method, model, error, cycles, exponent=100, **further):
     """A point of a report with made-up figures."""
-    settings = {"source": "teapot", "triangles": 992, "width": 320, "height": 240, "exponent": exponent}
+    settings = {"source": "teapot", "triangles": 1000, "width": 320, "height": 240, "exponent": exponent}
     return {
-        "settings": settings | {"method": method, "model": model},
+        "group": "software" if method == "phong" else "own",
+        "settings": settings | {"method": method, "model": model, "engine": "cxxrtl"} | further,
         "errors": {"method_max_lsb": error},
         "times": {"cycles_per_pixel": cycles},
-        "hardware": {"multipliers": 20},
+        "hardware": {"multipliers": 16 if method == "quotient" else 24},
     }
 
 
 def report():
-    """A report with made-up figures of three methods."""
-    points = [point("renormalise", "blinn", 0.53, 1.2), point("quotient", "blinn", 0.52, 1.0)]
-    points += [point("linear", "cosquad", 90.0, 1.3), point("quotient", "blinn", 0.6, 1.0, exponent=10)]
+    """A report with made-up figures of all methods and two rivals."""
+    points = [point(*form, 0.52 + k / 100, 1 + k / 100) for k, form in enumerate(FORMS)]
+    points += [
+        point("linear", "cosquad", 90.0, 1.3, operand="one_minus_cosine"),
+        point("linear", "blinn_product", 91.0, 1.3),
+        point("quadratic-published", "cosquad", 1.0, 1.3),
+        point("quotient", "blinn", 0.6, 1.0, exponent=10),
+        point("quotient", "blinn", 0.52, 0.6, lanes=2),
+        point("phong", "blinn", 0.5, None),
+    ]
     versions = {"blysk": "0.1.0", "Python": "3.11", "amaranth": "0.5", "numpy": "2"}
+    meshes = "teapot, 992 triangles", "torus, 14,400 triangles"
+    names = {"quotient": 16, "duff": 18, "bishop-weimer-six": 7, "renormalise, 3": 24}
     parts = [
-        {"method": name, "lights": lights, "multipliers": 9 * lights, "adders, bits": 700}
-        for name in ("duff", "renormalise")
+        {
+            "method": name,
+            "lights": lights,
+            "multipliers": count + 12 * (lights - 1),
+            "adders, bits": 700,
+            "multipliers of the netlist": count if name in ("quotient", "renormalise, 3") else None,
+        }
+        for name, count in names.items()
         for lights in (1, 8)
     ]
     errors = [
-        {"method": name, "mesh": "ring", "exponent": exponent, "largest error before rounding, LSB": 0.25}
-        for name in ("duff", "renormalise")
+        {
+            "method": name,
+            "mesh": mesh,
+            "exponent": exponent,
+            "largest error before rounding, LSB": 0.25,
+            "cycles a pixel": 1 + (name == "duff") * k,
+        }
+        for name in names
+        for k, mesh in enumerate(meshes)
         for exponent in (10, 100)
     ]
     tables = {"rivals-parts": {"rows": parts}, "rivals-errors": {"rows": errors}}
     figures = {"points": {"figures": {"points": points}}, "rivals": {"tables": tables}}
     return {"made": "2026-11-27T10:00:00+00:00", "versions": versions, "sections": figures}
+
+
+def measured():
+    """What the paper measures, made up."""
+    errors = [(0.5, 0.6)] * len(SHOWN)
+    exponents = {"triangles": 992, "size": "320x240", "blinn": errors, "phong": errors}
+    counts = [1, 2, 4, 8]
+    rows = [
+        {
+            "method": name,
+            "interval": 3,
+            "multipliers": [16 + 13 * (count - 1) for count in counts],
+            "widest": 18,
+        }
+        for name in OF_LIGHTS
+    ]
+    return measured_of(report()) | {"exponents": exponents, "lights": {"counts": counts, "rows": rows}}
 
 
 def test_cited_keys():
@@ -62,7 +112,7 @@ def test_references():
     assert list(reference_texts(["A1"], page)) == [
         {"key": "A1", "text": "B. C, _D\\_e_, 10.1/x\\#2, pages 1 to 2."}
     ]
-    with pytest.raises(ValueError, match="the paper cites Z, and"):
+    with pytest.raises(InputError, match=r"\[Z\]: docs/theory/references.md has no entry"):
         list(reference_texts(["Z"], page))
 
 
@@ -71,36 +121,85 @@ def test_tables_of_pages():
     found = documents_table(page, "| a | b |")
     assert found == {"header": ["a", "b"], "rows": [["`c`", "d | e"], ["g", "h"]]}
     assert columns(found, 1) == {"header": ["b"], "rows": [["d | e"], ["h"]]}
-    with pytest.raises(ValueError, match="no table begins with"):
+    with pytest.raises(InputError, match="no table of the page begins with"):
         documents_table(page, "| z |")
 
 
 def test_table_of_methods():
-    """The smallest error is first. Parts come from the store of placements."""
+    """The smallest error is first. Parts are those of a placed design with the same operand and interval."""
     rows = methods_of(report()["sections"]["points"]["figures"]["points"])
-    assert [(row["method"], row["error"]) for row in rows] == [
-        ("quotient", 0.52),
-        ("renormalise", 0.53),
-        ("linear", 90.0),
+    assert [(row["method"], row["model"]) for row in rows] == FORMS
+    assert [row["error"] for row in rows] == sorted(row["error"] for row in rows)
+    found = {(row["method"], row["model"]): row for row in rows}
+    own = found["quotient", "blinn"]
+    assert (own["operand"], own["seeds"]) == ("place", 3)
+    assert own["luts"] > 1000
+    assert own["mhz"] > 100
+    # It was placed with another setup interval than the report has.
+    other = found["renormalise", "cosquad"]
+    assert (other["operand"], other["luts"], other["mhz"], other["seeds"]) == (
+        "one_minus_cosine",
+        *[None] * 3,
+    )
+
+
+def test_a_method_has_a_documented_form_and_its_best_form():
+    points = report()["sections"]["points"]["figures"]["points"]
+    points += [
+        point("linear", "cosquad", 92.0, 1.3),
+        point("linear", "blinn", 93.0, 1.3, operand="one_minus_cosine"),
     ]
-    assert all(row["luts"] > 1000 and row["mhz"] > 50 for row in rows)
-    with pytest.raises(ValueError, match="are not in the report"):
-        methods_of([point("linear", "cosquad", 90.0, 1.3)])
+    documented, best = (row for row in methods_of(points) if row["error"] > 50)
+    assert (documented["model"], documented["operand"]) == ("cosquad", "cosine")
+    assert (best["model"], best["operand"]) == ("blinn", "one_minus_cosine")
+    luts = {entry["design"]: entry["luts"] for entry in read_store()}
+    assert documented["luts"] == luts["pipeline linear, cosquad, 1 light"]
+    assert best["luts"] == luts["pipeline linear, blinn, 1 light, one_minus_cosine"]
+
+
+def test_methods_beside_another():
+    own = {"method": "a", "model": "x", "error": 0.514, "cycles": 1.0041, "multipliers": 16, "luts": 9}
+    rows = [
+        own,
+        own | {"model": "y", "cycles": 1.003},
+        own | {"method": "b", "error": 0.511, "multipliers": 17, "luts": None},
+        own | {"method": "c", "error": 0.504, "cycles": 2, "multipliers": 15},
+        own | {"method": "c", "multipliers": 16, "luts": 8},
+    ]
+    assert beside(rows, own) == {
+        "error": {"less": ["c"], "same": ["a, y", "b"]},
+        "cycles": {"less": ["a, y"], "same": ["b", "c"]},
+        "multipliers": {"less": ["c"], "same": ["a, y"]},
+        "luts": {"less": ["c"], "same": ["a, y"]},
+    }
 
 
 def test_table_of_rivals():
     found = rivals_of(report()["sections"]["rivals"]["tables"])
-    assert (found["meshes"], found["most"]) == (["ring"], 8)
-    assert found["rows"][0] == {"method": "duff", "multipliers": [9, 72], "adders": 700, "errors": [0.25]}
+    assert found["meshes"] == ["teapot, 992 triangles", "torus, 14,400 triangles"]
+    assert found["most"] == 8
+    assert found["rows"][1] == {
+        "method": "duff",
+        "multipliers": [18, 102],
+        "adders": 700,
+        "netlist": None,
+        "errors": [0.25, 0.25],
+        "cycles": [1, 2],
+    }
+
+
+def test_checkers():
+    rows = [["torus", "9", "9", "9", "9"], ["floor, a", "1", "2", "3", "4"], ["floor, b", "2", "1", "1", "5"]]
+    assert checkers_of({"rows": rows}) == {"linear": 2, "linear_bound": 2, "srgb": 3, "srgb_bound": 5}
 
 
 def test_all_sources_of_the_paper_are_there():
     """Each citation has its entry, and each reference of the list is cited."""
-    data = data_of(report())
+    data = data_of(measured())
     assert [entry["key"] for entry in data["references"]] == cited(SOURCE.read_text(encoding="utf-8"))
     assert len(data["references"]) > 30
-    names = set(re.findall(r"data\.(?!json)(\w+)", SOURCE.read_text(encoding="utf-8")))
-    assert names <= data.keys() | {"exponents", "lights"}
+    assert set(re.findall(r"data\.(?!json)(\w+)", SOURCE.read_text(encoding="utf-8"))) <= data.keys()
+    assert data["scene"]["triangles"] == 992
 
 
 @pytest.mark.ci
@@ -108,10 +207,7 @@ def test_all_sources_of_the_paper_are_there():
 def test_the_paper_has_at_most_eight_pages(tmp_path):
     """Typst sets the text without a warning."""
     typst = pytest.importorskip("typst", reason="the extra paper is missing")
-    errors = [(0.5, 0.6)] * len(SHOWN)
-    exponents = {"triangles": 992, "size": "320x240", "blinn": errors, "phong": errors}
-    rows = [{"method": name, "interval": 3, "multipliers": [16]} for name in OF_LIGHTS]
-    made = paper(report(), tmp_path, exponents, {"counts": [1], "rows": rows})
+    made = paper(data_of(measured()), tmp_path)
     assert made.startswith(b"%PDF")
     pages, warnings = typst.compile_with_warnings(
         tmp_path / SOURCE.name, format="png", ppi=20, ignore_system_fonts=True
@@ -124,8 +220,11 @@ def test_the_paper_has_at_most_eight_pages(tmp_path):
     ("content", "line"),
     [
         (None, "is not such a report; give the report.json of `blysk bench --only points --only rivals`"),
+        ("{", "is not such a report"),
+        ("[]", "is not such a report"),
         ("{}", "is not such a report"),
-        (json.dumps({"sections": {"points": {"figures": {"points": []}}}}), "are not in the report"),
+        (json.dumps({"sections": {"points": {"figures": {"points": []}}}}), "has no "),
+        (json.dumps(report() | {"versions": {}}), "is not such a report"),
     ],
 )
 def test_a_file_that_is_no_report(content, line, tmp_path, capsys):
@@ -139,9 +238,23 @@ def test_a_file_that_is_no_report(content, line, tmp_path, capsys):
     assert not (tmp_path / "paper.pdf").exists()
 
 
+def test_a_fault_of_a_page_is_told_as_such(tmp_path, capsys, monkeypatch):
+    """Not as a fault of the report."""
+    file = tmp_path / "report.json"
+    file.write_text(json.dumps(report()))
+    of_lights = measured()
+    monkeypatch.setattr(module, "exponents_of", lambda *_: of_lights["exponents"])
+    monkeypatch.setattr(module, "lights_of", lambda: of_lights["lights"])
+    monkeypatch.setattr(module, "cited", lambda text: ["Nobody99"])
+    assert main([str(file), "-o", str(tmp_path / "paper.pdf")]) == 2
+    told = capsys.readouterr().err
+    assert "[Nobody99]: docs/theory/references.md has no entry of it; write the entry" in told
+    assert told.count("\n") == 1
+
+
 @pytest.mark.long
 def test_multipliers_of_the_table_of_lights():
     """Multipliers of the table of lights are those of the netlist; `quotient` with one light has 16."""
     assert module.lights_of(("quotient",), (1,))["rows"] == [
-        {"method": "quotient", "interval": 3, "multipliers": [16]}
+        {"method": "quotient", "interval": 3, "multipliers": [16], "widest": 18}
     ]
