@@ -8,28 +8,32 @@ import json
 import re
 import shutil
 import sys
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
 import click
 
 from blysk.bench.command import run
+from blysk.bench.quality.paper_pages import (
+    checkers_of,
+    cited,
+    columns,
+    documents_table,
+    materials_of,
+    reference_texts,
+)
 from blysk.sim.errors import InputError
 from blysk.sim.output import atomic_writer, check_writable, write_json
 
 __all__ = [
     "beside",
-    "checkers_of",
-    "cited",
     "data_of",
-    "documents_table",
     "exponents_of",
     "lights_of",
     "measured_of",
     "methods_of",
     "paper",
-    "reference_texts",
     "rivals_of",
 ]
 
@@ -43,92 +47,6 @@ SHOWN = 1, 2, 3, 10, 30, 100, 300, 1000
 """Exponents in the drawing of errors and bounds."""
 EXPONENT = 100
 """Exponent of the table of methods."""
-
-
-def cited(text: str) -> list[str]:
-    """Keys of references that a text of Typst cites by ``#cite("Key", ...)``, sorted, each once."""
-    calls = re.findall(r'#cite\(((?:"\w+"(?:,\s*)?)+)\)', text)
-    return sorted({key for call in calls for key in re.findall(r'"(\w+)"', call)}, key=str.lower)
-
-
-def _typst(text: str) -> str:
-    """Text of Markdown as Typst: emphasis and code stay, links become their words."""
-    text = re.sub(r"\[([^]]*)\]\([^)]*\)", r"\1", " ".join(text.split())).replace("\\|", "|")
-    parts = re.split(r"(`[^`]*`|\*[^*]+\*|https?://[^\s,]*[^\s,.])", text)
-    for k, part in enumerate(parts):
-        if k % 2 == 0:
-            parts[k] = re.sub(r"([#$@<>\[\]_*=~])", r"\\\1", part)
-        elif part[0] == "*":
-            parts[k] = "_" + re.sub(r"([#$@<>\[\]_])", r"\\\1", part[1:-1]) + "_"
-    return "".join(parts)
-
-
-def reference_texts(keys: Sequence[str], page: str) -> Iterator[dict[str, str]]:
-    """Entries of docs/theory/references.md.
-
-    Parameters
-    ----------
-    keys : sequence of str
-        Keys of the entries.
-    page : str
-        The page.
-
-    Yields
-    ------
-    dict of str to str
-        ``key``, and ``text`` in Typst.
-
-    Raises
-    ------
-    InputError
-        If the page has no entry of a key.
-    """
-    entries = dict(re.findall(r"^### \[(\w+)\]\n\n(.*?)(?=\n\n|\Z)", page, re.MULTILINE | re.DOTALL))
-    for key in keys:
-        if key not in entries:
-            raise InputError(f"[{key}]", "docs/theory/references.md has no entry of it", "write the entry")
-        yield {"key": key, "text": _typst(entries[key])}
-
-
-def documents_table(page: str, first: str) -> dict[str, Any]:
-    """A table of a page in Markdown, so that its figures stand in one place.
-
-    Parameters
-    ----------
-    page : str
-        The page.
-    first : str
-        Beginning of the table's first line.
-
-    Returns
-    -------
-    dict
-        ``header`` and ``rows``, lists of texts in Typst.
-
-    Raises
-    ------
-    InputError
-        If the page has no such table.
-    """
-    _, found, rest = page.partition(f"\n{first}")
-    if not found:
-        raise InputError(first, "no table of the page begins with this line", "name the table's first line")
-    lines = (found.strip() + rest).split("\n\n", 1)[0].splitlines()
-    rows = [[_typst(cell.strip()) for cell in re.split(r"(?<!\\)\|", line)[1:-1]] for line in lines]
-    return {"header": rows[0], "rows": rows[2:]}
-
-
-def columns(table: Mapping[str, Any], *numbers: int) -> dict[str, Any]:
-    """Some columns of a table of `documents_table`, by their numbers from 0 on."""
-    rows = [[row[k] for k in numbers] for row in (table["header"], *table["rows"])]
-    return {"header": rows[0], "rows": rows[1:]}
-
-
-def checkers_of(table: Mapping[str, Any]) -> dict[str, float]:
-    """Largest errors and bounds of the floors with checkers, from a table of `documents_table`."""
-    rows = [row[1:] for row in table["rows"] if row[0].startswith("floor")]
-    names = "linear", "linear_bound", "srgb", "srgb_bound"
-    return {name: max(map(float, of)) for name, of in zip(names, zip(*rows, strict=True), strict=True)}
 
 
 def methods_of(points: Sequence[Mapping[str, Any]]) -> list[dict[str, Any]]:
@@ -203,10 +121,17 @@ def rivals_of(tables: Mapping[str, Mapping[str, Any]]) -> dict[str, Any]:
     Returns
     -------
     dict
-        ``meshes``, and ``rows`` with ``method``, ``multipliers`` with one light and with the most lights,
-        ``adders`` in bits, ``netlist`` multipliers with one light or ``None``, and ``errors`` in LSB before
-        rounding and ``cycles`` a pixel on each mesh. ``most`` is the number of lights.
+        - ``meshes``, and ``most``: the largest number of lights;
+        - ``rows``: ``method``; ``multipliers`` with one light and with the most lights; ``adders``: bits with
+          one light; ``area``; ``netlist``: multipliers with one light, or ``None``; ``beat``: bits of a beat;
+          on each mesh ``errors`` in LSB before rounding, ``cycles`` a pixel, and ``switched`` bits a pixel or
+          ``None``;
+        - ``fronts``: for each mesh the methods with Blinn's highlight on the front of error against ``area``
+          times cycles, and of error against ``switched`` bits.
     """
+    from blysk.bench.report.rivals import front_of
+    from blysk.golden.rivals.registry import COMPARED
+
     parts, errors = tables["rivals-parts"]["rows"], tables["rivals-errors"]["rows"]
     most = max(row["lights"] for row in parts)
     found = {(row["method"], row["lights"]): row for row in parts}
@@ -215,18 +140,32 @@ def rivals_of(tables: Mapping[str, Mapping[str, Any]]) -> dict[str, Any]:
         if row["exponent"] == EXPONENT:
             of_mesh.setdefault(row["method"], {})[row["mesh"]] = row
     meshes = list(next(iter(of_mesh.values())))
-    rows = [
-        {
-            "method": name,
-            "multipliers": [found[name, count]["multipliers"] for count in (1, most)],
-            "adders": found[name, 1]["adders, bits"],
-            "netlist": found[name, 1]["multipliers of the netlist"],
-            "errors": [of[mesh]["largest error before rounding, LSB"] for mesh in meshes],
-            "cycles": [of[mesh]["cycles a pixel"] for mesh in meshes],
-        }
-        for name, of in of_mesh.items()
-    ]
-    return {"meshes": meshes, "most": most, "rows": rows}
+    rows = []
+    for name, of in of_mesh.items():
+        one = found[name, 1]
+        rows.append(
+            {
+                "method": name,
+                "multipliers": [found[name, count]["multipliers"] for count in (1, most)],
+                "adders": one["adders, bits"],
+                "area": one["area, bits of adders"],
+                "netlist": one["multipliers of the netlist"],
+                "beat": f"{one['bits a beat']} a {one['beat']}",
+                "errors": [of[mesh]["largest error before rounding, LSB"] for mesh in meshes],
+                "cycles": [of[mesh]["cycles a pixel"] for mesh in meshes],
+                "switched": [of[mesh]["switched bits a pixel"] for mesh in meshes],
+            }
+        )
+    same = [row for row in rows if COMPARED[row["method"]].REFLECTION.name == "blinn"]
+    fronts: dict[str, list[list[str]]] = {"area": [], "switched": []}
+    for k in range(len(meshes)):
+        area = {row["method"]: (row["area"] * row["cycles"][k], row["errors"][k]) for row in same}
+        counted = [row for row in same if row["switched"][k] is not None]
+        fronts["area"].append(front_of(area))
+        fronts["switched"].append(
+            front_of({of["method"]: (of["switched"][k], of["errors"][k]) for of in counted})
+        )
+    return {"meshes": meshes, "most": most, "rows": rows, "fronts": fronts}
 
 
 PRINTED = {"error": 2, "cycles": 3, "multipliers": 0, "luts": 0}
@@ -247,7 +186,7 @@ def beside(rows: Sequence[Mapping[str, Any]], own: Mapping[str, Any]) -> dict[st
     -------
     dict
         For each number of `PRINTED`: ``less`` and ``same``, names of methods, each once. A method counts in
-        each of its forms. Further forms of the design's own method have their highlight in the name.
+        each of its forms. A further form of the design's own method has its highlight behind a slash.
     """
     found = {}
     for part, digits in PRINTED.items():
@@ -257,7 +196,7 @@ def beside(rows: Sequence[Mapping[str, Any]], own: Mapping[str, Any]) -> dict[st
                 continue
             value, limit = (round(of[part], digits) for of in (row, own))
             of_own = row["method"] == own["method"]
-            name = f"{row['method']}, {row['model']}" if of_own else row["method"]
+            name = f"{row['method']}/{row['model']}" if of_own else row["method"]
             if value <= limit:
                 names["less" if value < limit else "same"].append(name)
         less = list(dict.fromkeys(names["less"]))
@@ -357,7 +296,7 @@ def data_of(measured: Mapping[str, Any]) -> dict[str, Any]:
         {name: (PROJECT / "docs" / folder / f"{name}.md").read_text(encoding="utf-8") for name in names}
         for folder, names in (
             ("guide", ("accuracy", "checked", "fpga")),
-            ("theory", ("geometry", "quotient", "references", "textures")),
+            ("theory", ("geometry", "measured", "quotient", "references", "textures")),
         )
     )
     return {
@@ -371,6 +310,7 @@ def data_of(measured: Mapping[str, Any]) -> dict[str, Any]:
         "beside": beside(methods, own),
         "all_spans": documents_table(theory["quotient"], "| spans of up to |"),
         "found_spans": documents_table(theory["quotient"], "| | n = 1 | n = 10 |"),
+        "materials": materials_of(theory["measured"]),
         "geometry": documents_table(theory["geometry"], "| spans from | `blinn`, n = 10 |"),
         "checkers": checkers_of(
             documents_table(theory["textures"], "| scene | linear light | bound | sRGB |")

@@ -5,8 +5,10 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from matplotlib.axis import Axis
 from matplotlib.figure import Figure
 from matplotlib.patches import FancyBboxPatch
+from matplotlib.ticker import NullLocator
 
 from blysk.bench.labels import Label, place_labels
 from blysk.bench.svg import panels
@@ -31,6 +33,11 @@ def _write(figure: Figure, path: Path) -> None:
     figure.savefig(path, metadata={"CreationDate": None})
 
 
+def _ticks(axis: Axis, *values: float) -> None:
+    axis.set_ticks(values, [f"{value:g}" for value in values])
+    axis.set_minor_locator(NullLocator())
+
+
 def draw_exponents(path: Path, found: Mapping[str, Any], exponents: Sequence[int]) -> None:
     """Largest errors and bounds over the exponent.
 
@@ -49,6 +56,7 @@ def draw_exponents(path: Path, found: Mapping[str, Any], exponents: Sequence[int
         axes.plot(exponents, errors, "o-", color=color, markersize=3, linewidth=1, label=f"{model}: found")
         axes.plot(exponents, bounds, "--", color=color, linewidth=1, label=f"{model}: bound")
     axes.set(xscale="log", xlabel="exponent n", ylabel="error, LSB")
+    _ticks(axes.xaxis, 1, 10, 100, 1000)
     axes.axhline(0.5, color="#999999", linewidth=0.8)
     axes.legend(fontsize=7, frameon=False)
     _write(figure, path)
@@ -76,6 +84,8 @@ def draw_front(path: Path, rows: Sequence[Mapping[str, Any]]) -> None:
             labels.setdefault(name, Label(*place, name, color))
     axes.set(xscale="log", yscale="log", xlabel="cycles a pixel", ylabel="largest error, LSB")
     axes.axhline(0.5, color="#999999", linewidth=0.8)
+    _ticks(axes.xaxis, 1, 2, 5, 10)
+    _ticks(axes.yaxis, 0.5, 1, 10, 100)
     axes.margins(x=0.2, y=0.15)
     place_labels(axes, list(labels.values()), [(row["cycles"], row["error"]) for row in rows])
     _write(figure, path)

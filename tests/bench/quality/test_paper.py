@@ -1,4 +1,4 @@
-"""The paper: its citations, the tables that it takes from pages, its table of methods, its PDF."""
+"""The paper: its tables of methods and of rivals, its PDF, and the faults of its inputs."""
 
 import json
 import re
@@ -11,21 +11,16 @@ from blysk.bench.quality.paper import (
     SHOWN,
     SOURCE,
     beside,
-    checkers_of,
-    cited,
-    columns,
     data_of,
-    documents_table,
     main,
     measured_of,
     methods_of,
     paper,
-    reference_texts,
     rivals_of,
 )
+from blysk.bench.quality.paper_pages import cited
 from blysk.golden.presets import METHODS
 from blysk.sim.api.placed import read_store
-from blysk.sim.errors import InputError
 
 FORMS = [("quotient", "blinn"), ("quotient", "phong"), ("renormalise", "cosquad")]
 FORMS += [(method, "blinn") for method in METHODS if method != "quotient"]
@@ -64,6 +59,9 @@ def report():
             "lights": lights,
             "multipliers": count + 12 * (lights - 1),
             "adders, bits": 700,
+            "area, bits of adders": 324 * count + 700,
+            "beat": "span",
+            "bits a beat": 112,
             "multipliers of the netlist": count if name in ("quotient", "renormalise, 3") else None,
         }
         for name, count in names.items()
@@ -76,6 +74,7 @@ def report():
             "exponent": exponent,
             "largest error before rounding, LSB": 0.25,
             "cycles a pixel": 1 + (name == "duff") * k,
+            "switched bits a pixel": None if name == "duff" else names[name],
         }
         for name in names
         for k, mesh in enumerate(meshes)
@@ -101,28 +100,6 @@ def measured():
         for name in OF_LIGHTS
     ]
     return measured_of(report()) | {"exponents": exponents, "lights": {"counts": counts, "rows": rows}}
-
-
-def test_cited_keys():
-    assert cited('a #cite("Duff79", "C") b #cite("C") #cite("DEC90").') == ["C", "DEC90", "Duff79"]
-
-
-def test_references():
-    page = "### [A1]\n\nB. C, *D_e*, 10.1/x#2,\npages 1 to 2.\n\n### [F]\n\nG.\n"
-    assert list(reference_texts(["A1"], page)) == [
-        {"key": "A1", "text": "B. C, _D\\_e_, 10.1/x\\#2, pages 1 to 2."}
-    ]
-    with pytest.raises(InputError, match=r"\[Z\]: docs/theory/references.md has no entry"):
-        list(reference_texts(["Z"], page))
-
-
-def test_tables_of_pages():
-    page = "x\n\n| a | b |\n|---|---:|\n| `c` | d \\| [e](f.md) |\n| g | h |\n\ny\n"
-    found = documents_table(page, "| a | b |")
-    assert found == {"header": ["a", "b"], "rows": [["`c`", "d | e"], ["g", "h"]]}
-    assert columns(found, 1) == {"header": ["b"], "rows": [["d | e"], ["h"]]}
-    with pytest.raises(InputError, match="no table of the page begins with"):
-        documents_table(page, "| z |")
 
 
 def test_table_of_methods():
@@ -167,10 +144,10 @@ def test_methods_beside_another():
         own | {"method": "c", "multipliers": 16, "luts": 8},
     ]
     assert beside(rows, own) == {
-        "error": {"less": ["c"], "same": ["a, y", "b"]},
-        "cycles": {"less": ["a, y"], "same": ["b", "c"]},
-        "multipliers": {"less": ["c"], "same": ["a, y"]},
-        "luts": {"less": ["c"], "same": ["a, y"]},
+        "error": {"less": ["c"], "same": ["a/y", "b"]},
+        "cycles": {"less": ["a/y"], "same": ["b", "c"]},
+        "multipliers": {"less": ["c"], "same": ["a/y"]},
+        "luts": {"less": ["c"], "same": ["a/y"]},
     }
 
 
@@ -182,15 +159,14 @@ def test_table_of_rivals():
         "method": "duff",
         "multipliers": [18, 102],
         "adders": 700,
+        "area": 6532,
         "netlist": None,
+        "beat": "112 a span",
         "errors": [0.25, 0.25],
         "cycles": [1, 2],
+        "switched": [None, None],
     }
-
-
-def test_checkers():
-    rows = [["torus", "9", "9", "9", "9"], ["floor, a", "1", "2", "3", "4"], ["floor, b", "2", "1", "1", "5"]]
-    assert checkers_of({"rows": rows}) == {"linear": 2, "linear_bound": 2, "srgb": 3, "srgb_bound": 5}
+    assert found["fronts"] == {"area": [["bishop-weimer-six"]] * 2, "switched": [["bishop-weimer-six"]] * 2}
 
 
 def test_all_sources_of_the_paper_are_there():
