@@ -12,6 +12,7 @@ from blysk.bench.tools.device_names import DEVICE_NAMES
 from blysk.bench.tools.devices import PARTS
 from blysk.bench.tools.families import DEVICE
 from blysk.golden.presets import LOBES, METHODS, MODELS, PUBLISHED
+from blysk.golden.rivals.registry import RIVALS
 from blysk.sim.api.placed import STORE, design_of, read_store
 
 COLORED = ", srgb", ", srgb, compact"
@@ -24,7 +25,8 @@ def test_table_of_the_guide_is_the_store():
     """Every row of a pipeline has the figures of the store: parts, and a clock rate for each seed."""
     store = {entry["design"]: entry for entry in read_store() if entry["device"] == DEVICE}
     rows = re.findall(
-        r"^\| `([\w-]+)`, `(\w+)`(, 1 - N·H)?(, interval \d)? \| ([\d,]+) \| ([\d,]+) \| (\d+) \| (\d+) \| ([\d, ]+\d)",
+        r"^\| `([\w-]+)`, `(\w+)`(, 1 - N·H)?(, interval \d)? \| "
+        r"([\d,]+) \| ([\d,]+) \| (\d+) \| (\d+) \| ([\d, ]+\d)",
         GUIDE.read_text(encoding="utf-8"),
         re.MULTILINE,
     )
@@ -35,6 +37,31 @@ def test_table_of_the_guide_is_the_store():
         assert [int(rate) for rate in rates.split(", ")] == sorted(map(round, entry["fmax_mhz"])), entry
     plain = [name for name in store if name.startswith("pipeline ") and not name.endswith(COLORED)]
     assert len(rows) == len(plain)
+
+
+def test_table_of_rivals_is_the_store():
+    """Every placed row has the rates of the store and their number. Designs of no placement are not in it."""
+    page = GUIDE.with_name("rivals.md").read_text(encoding="utf-8").partition("## Placed")[2]
+    rows = re.findall(
+        r"^\| `([\w-]+)`([^|]*) \| `(\w+)` \| (?:RTL|a model) \| ([^|]+) \| (\d) \|$", page, re.MULTILINE
+    )
+    store = {entry["design"]: entry["fmax_mhz"] for entry in read_store() if entry["device"] == DEVICE}
+    placed_rows = 0
+    for method, form, model, rates, seeds in rows:
+        method = "angular" if "angular" in form else method
+        interval = ", interval 4" * ("interval 4" in form)
+        name = f"pipeline {method}, {model}, 1 light{', one_minus_cosine' * ('N·H' in form)}{interval}"
+        if rates in ("not placed", "none"):
+            assert int(seeds) == 0
+            assert name not in store or "intervals" in form
+            continue
+        placed_rows += 1
+        assert [int(rate) for rate in rates.split(", ")] == sorted(map(round, store[name])), name
+        assert int(seeds) == len(store[name])
+    assert placed_rows == 13
+    assert {method for method, *_ in rows} >= {name.partition(",")[0] for name in RIVALS} - {
+        "bishop-weimer-six"
+    }
 
 
 def test_table_of_colours_is_the_store():
