@@ -48,6 +48,9 @@ SHOWN = 1, 2, 3, 10, 30, 100, 300, 1000
 EXPONENT = 100
 """Exponent of the table of methods."""
 
+_ENGINES = {"cxxrtl": "the simulated RTL", "model": "the model of cycles or a simulation with another lobe"}
+"""Words for the sources of cycles, by the engine of a point."""
+
 
 def methods_of(points: Sequence[Mapping[str, Any]]) -> list[dict[str, Any]]:
     """Rows of the table of methods: those of the report at exponent `EXPONENT` on the teapot.
@@ -64,9 +67,9 @@ def methods_of(points: Sequence[Mapping[str, Any]]) -> list[dict[str, Any]]:
     Returns
     -------
     list of dict
-        ``method``, ``model``, ``operand``, ``error`` in LSB against exact normals with the same lobe,
-        ``cycles`` a pixel, ``multipliers``; ``luts``, ``flip_flops``, ``mhz`` (the median) and ``seeds``,
-        ``None`` without a placement. The smallest error is first.
+        ``method``, ``model``, ``operand``, ``engine``; ``error`` in LSB against exact normals with the same
+        lobe, ``cycles`` a pixel, ``multipliers``; ``luts``, ``flip_flops``, ``mhz`` (the median), ``seeds``
+        and ``date``, ``None`` without a placement. The smallest error is first.
 
     Raises
     ------
@@ -95,6 +98,7 @@ def methods_of(points: Sequence[Mapping[str, Any]]) -> list[dict[str, Any]]:
                 "method": method,
                 "model": model,
                 "operand": settings.get("operand", METHODS[method].operand),
+                "engine": settings["engine"],
                 "error": point["errors"]["method_max_lsb"],
                 "cycles": point["times"]["cycles_per_pixel"],
                 "multipliers": point["hardware"]["multipliers"],
@@ -102,6 +106,7 @@ def methods_of(points: Sequence[Mapping[str, Any]]) -> list[dict[str, Any]]:
                 "flip_flops": parts.get("flip_flops"),
                 "mhz": round(parts["fmax_median_mhz"]) if parts else None,
                 "seeds": len(parts["fmax_mhz"]) if parts else None,
+                "date": parts.get("date"),
             }
         )
     lacking = {(method, "blinn") for method in METHODS} - {(row["method"], row["model"]) for row in rows}
@@ -227,7 +232,7 @@ def measured_of(report: Mapping[str, Any]) -> dict[str, Any]:
             "made": report["made"][:10],
             "tools": ", ".join(f"{name} {versions[name]}" for name in ("Python", "amaranth", "numpy")),
             "methods": methods,
-            "engines": sorted({p["settings"]["engine"] for p in points if p["group"] != "software"}),
+            "cycles_of": " and ".join(dict.fromkeys(_ENGINES[row["engine"]] for row in methods)),
             "scene": {
                 "triangles": settings["triangles"],
                 "size": f"{settings['width']}x{settings['height']}",
@@ -308,6 +313,7 @@ def data_of(measured: Mapping[str, Any]) -> dict[str, Any]:
         "renormalise": other,
         "mirror": named["quotient", "phong"],
         "beside": beside(methods, own),
+        "dates": sorted({row["date"] for row in methods if row["date"]}),
         "all_spans": documents_table(theory["quotient"], "| spans of up to |"),
         "found_spans": documents_table(theory["quotient"], "| | n = 1 | n = 10 |"),
         "materials": materials_of(theory["measured"]),

@@ -33,14 +33,12 @@ CHANGES = {
     "at most 18 bits": lambda data: data["lights"]["rows"][0].update(widest=19),
     "a pixel in each cycle": lambda data: rival(data, "quotient").update(cycles=[1, 1.1]),
     "13 multipliers": lambda data: data["lights"]["rows"][0].update(multipliers=[16, 29, 55, 108]),
-    "simulated RTL": lambda data: data.update(engines=["cxxrtl", "model"]),
     "No row is at least as good": lambda data: data["methods"].append(data["design"] | {"cycles": 0.9}),
     "From two lights on": lambda data: data["more_lights"]["rows"][0].reverse(),
     "more multipliers, and": lambda data: data["renormalise"].update(multipliers=16),
     "a netlist with one light confirms": lambda data: rival(data, "quotient").update(netlist=17),
     "the count may be too low": lambda data: rival(data, "quotient").update(multipliers=[16, 107]),
     "and as exact": lambda data: rival(data, "duff").update(errors=[0.25, 0.3]),
-    "On the densest mesh": lambda data: rival(data, "duff").update(cycles=[2, 1]),
 }
 """A change of the data for each claim, by words of the claim."""
 
