@@ -129,7 +129,8 @@ def rivals_of(tables: Mapping[str, Mapping[str, Any]]) -> dict[str, Any]:
         - ``meshes``, and ``most``: the largest number of lights;
         - ``rows``: ``method``; ``multipliers`` with one light and with the most lights; ``adders``: bits with
           one light; ``area``; ``netlist``: multipliers with one light, or ``None``; ``beat``: bits of a beat;
-          on each mesh ``errors`` in LSB before rounding, ``cycles`` a pixel, and ``switched`` bits a pixel or
+          ``host``: products, sums, and divisions with roots and powers, for a triangle and for a span; on
+          each mesh ``errors`` in LSB before rounding, ``cycles`` a pixel, and ``switched`` bits a pixel or
           ``None``;
         - ``fronts``: for each mesh the methods with Blinn's highlight on the front of error against ``area``
           times cycles, and of error against ``switched`` bits.
@@ -140,6 +141,7 @@ def rivals_of(tables: Mapping[str, Mapping[str, Any]]) -> dict[str, Any]:
     parts, errors = tables["rivals-parts"]["rows"], tables["rivals-errors"]["rows"]
     most = max(row["lights"] for row in parts)
     found = {(row["method"], row["lights"]): row for row in parts}
+    hosts = {row["method"]: row for row in tables["rivals-host"]["rows"] if row["lights"] == 1}
     of_mesh: dict[str, dict[str, Mapping[str, Any]]] = {}
     for row in errors:
         if row["exponent"] == EXPONENT:
@@ -156,6 +158,7 @@ def rivals_of(tables: Mapping[str, Mapping[str, Any]]) -> dict[str, Any]:
                 "area": one["area, bits of adders"],
                 "netlist": one["multipliers of the netlist"],
                 "beat": f"{one['bits a beat']} a {one['beat']}",
+                "host": [_host(hosts[name], rate) for rate in ("triangle", "span")],
                 "errors": [of[mesh]["largest error before rounding, LSB"] for mesh in meshes],
                 "cycles": [of[mesh]["cycles a pixel"] for mesh in meshes],
                 "switched": [of[mesh]["switched bits a pixel"] for mesh in meshes],
@@ -171,6 +174,12 @@ def rivals_of(tables: Mapping[str, Mapping[str, Any]]) -> dict[str, Any]:
             front_of({of["method"]: (of["switched"][k], of["errors"][k]) for of in counted})
         )
     return {"meshes": meshes, "most": most, "rows": rows, "fronts": fronts}
+
+
+def _host(row: Mapping[str, Any], rate: str) -> list[int]:
+    """Products, sums, and all other operations of the host, for a triangle or a span."""
+    kinds = ("multiplications",), ("additions",), ("divisions", "roots", "functions")
+    return [round(sum(row[f"{kind} a {rate}"] for kind in of)) for of in kinds]
 
 
 PRINTED = {"error": 2, "cycles": 3, "multipliers": 0, "luts": 0}

@@ -80,7 +80,11 @@ def report():
         for k, mesh in enumerate(meshes)
         for exponent in (10, 100)
     ]
-    tables = {"rivals-parts": {"rows": parts}, "rivals-errors": {"rows": errors}}
+    kinds = "multiplications", "additions", "divisions", "roots", "functions"
+    work = {f"{kind} a {rate}": k for rate in ("triangle", "span") for k, kind in enumerate(kinds, 1)}
+    hosts = [{"method": name, "lights": 1} | work for name in names]
+    tables = {"parts": parts, "errors": errors, "host": hosts}
+    tables = {f"rivals-{name}": {"rows": rows} for name, rows in tables.items()}
     figures = {"points": {"figures": {"points": points}}, "rivals": {"tables": tables}}
     return {"made": "2026-11-27T10:00:00+00:00", "versions": versions, "sections": figures}
 
@@ -162,6 +166,7 @@ def test_table_of_rivals():
         "area": 6532,
         "netlist": None,
         "beat": "112 a span",
+        "host": [[1, 2, 12], [1, 2, 12]],
         "errors": [0.25, 0.25],
         "cycles": [1, 2],
         "switched": [None, None],

@@ -1,6 +1,7 @@
 """Statements of the paper: each is in its text, and is refused if the figures or the pages are others."""
 
 import copy
+import re
 
 import pytest
 
@@ -68,3 +69,8 @@ def test_a_changed_page_is_refused(data, monkeypatch):
     monkeypatch.setattr(module, "REPEATED", {said: (page, f"{words} and more")})
     with pytest.raises(InputError, match="does not say"):
         check(data, TEXT)
+
+
+def test_typst_reads_no_mark_of_the_text_as_its_own():
+    """A number with a point begins a list at the start of a line. A semicolon behind a value is left out."""
+    assert not re.search(r"^\s*\d+\. |#[\w.()-]+;", TEXT, re.MULTILINE)
