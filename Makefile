@@ -119,10 +119,11 @@ release: boards
 	cd dist && $(SHA256) * > ../build/SHA256SUMS
 	mv build/SHA256SUMS dist
 
-# Measures the section of the report that the paper takes, with pictures of full size.
+# Measures the sections of the report that the paper takes, with pictures of full size; this takes hours.
+# PAPER_OPTIONS=--quick takes small pictures, in minutes.
 paper: $(VENV)/.installed-bench
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check -e '.[paper]'
-	$(BIN)/blysk bench build/paper/report --only points --only rivals
+	$(BIN)/blysk bench build/paper/report --only points --only rivals $(PAPER_OPTIONS)
 	$(BIN)/python -m blysk.bench.quality.paper build/paper/report/report.json
 
 lint: style types
