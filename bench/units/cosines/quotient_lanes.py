@@ -59,6 +59,14 @@ def _long_spans(unit, rng, count):
     return vector_case(unit, vectors, length, line_directions(rng, unit.model.lights))
 
 
+def _any_steps(unit, rng, count):
+    """Steps of any size, not shifted. Sums wrap."""
+    length = rng.integers(3, 8, count)
+    start, step = rng.integers(1 - (1 << 17), 1 << 17, (2, count, len(unit.model.components)))
+    vectors = SpanVectors(start, step, np.zeros(count, dtype=np.int64))
+    return vector_case(unit, vectors, length, line_directions(rng, unit.model.lights))
+
+
 RECORD = Record(
     name="quotient_lanes",
     title="Squares and linear functions of N/W along spans, two pixels a cycle",
@@ -75,12 +83,17 @@ RECORD = Record(
     stimuli={
         "spans": Stimulus(_spans, 3000),
         "words": Stimulus(extreme_words, 500, repeats=4),
+        "steps": Stimulus(_any_steps, 100),
         "long spans": Stimulus(_long_spans, stalled=False),
     },
     axis="",
     still={
-        "the second difference of w is positive and less than 2": "second[97]",
+        "a square is no odd multiple of 2": "start_x0[1] start_y0[1] start_z0[1] start_sum_1[1]",
+        "squares of components are less than 2^34": "start_x0[34-35] start_y0[34-35] start_z0[34-35] "
+        "start_sum_1[34-35] start_sum_0[35-36]",
+        "the second difference of w is positive and less than 2": "second[97] whole_1[48] change_1[48]",
         "the second difference of z is a multiple of 8": "second[98-100]",
-        "words of the first lane change by twice a step": "line_0[0] line_0_of_0[0] height_0[0]",
+        "words of the first lane change by twice a step": "line_0[0] line_0_base[0] line_0_of_0[0] "
+        "height_0[0]",
     },
 )
