@@ -60,7 +60,7 @@ decided: $(VENV)/.installed-test
 	rm -f build/decided
 	DECIDED=$(CURDIR)/build/decided $(BIN)/python -m pytest -n $(TEST_WORKERS) --no-loadscope-reorder \
 		-m "prove or long" tests/formal tests/test_units.py \
-		tests/simulators tests/hdl/test_toggle_coverage.py
+		tests/simulators tests/hdl/test_toggle_coverage.py tests/sim/frames/test_testbench.py
 	LC_ALL=C sort -u build/decided > tests/decided.txt
 
 # A search for the largest errors. ADVERSARY_SEED=N searches from another seed.

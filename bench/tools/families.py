@@ -112,7 +112,7 @@ ECP5 = Family(
         *("--lpf-allow-unconstrained", "--out-of-context", "--timing-allow-fail"),
     ),
     # This placer brings registers nearer to their multipliers than the default placer. With very little
-    # logic it does not end. The second option lets the router route slow paths again.
+    # logic, or many block RAMs, it does not end. The second option lets the router route slow paths again.
     large=("--placer", "static", "--tmg-ripup"),
     # Two registers on each side of a multiplier belong to this multiplier. So equal registers are kept, not
     # merged. The mapper saves look-up tables on paths shorter than 2.5 ns. It estimates 0.3 ns for a wire.
@@ -195,6 +195,8 @@ class Place:
     rerouted : bool
         Whether the target was out of reach. The design was then routed a second time. In this second routing
         nextpnr does not remove slow paths to route them again.
+    default_placer : bool
+        Whether the static placer did not end, and nextpnr's default placer placed the design.
     """
 
     seed: int
@@ -206,6 +208,7 @@ class Place:
     kinds: dict[str, int]
     closed: int = 0
     rerouted: bool = False
+    default_placer: bool = False
 
 
 def signal_name(cell: str, family: Family) -> str:

@@ -50,7 +50,7 @@ __all__ = [
     "name_of",
     "pipelines_of",
     "place",
-    "rerouted",
+    "run_again",
     "table",
     "table_by_unit",
     "units_of",
@@ -110,9 +110,14 @@ def untimed(layouts: Sequence[Layout], family: Family = ECP5) -> Iterator[str]:
             )
 
 
-def rerouted(layouts: Sequence[Layout]) -> Iterator[str]:
-    """A line for each design that is so far from the target that slow paths could not be mended."""
+def run_again(layouts: Sequence[Layout]) -> Iterator[str]:
+    """A line for each design for which nextpnr was run again with other options, see `Place`."""
     for layout in layouts:
+        if seeds := [str(place.seed) for place in layout.places if place.default_placer]:
+            yield (
+                f"{layout.name}: with seed {', '.join(seeds)} the static placer found no place for block "
+                "RAMs or multipliers. nextpnr's default placer placed the design."
+            )
         if seeds := [str(place.seed) for place in layout.places if place.rerouted]:
             yield (
                 f"{layout.name}: with seed {', '.join(seeds)} the target was out of reach. The design was "
@@ -247,7 +252,7 @@ def place(designs: Designs, family: Family, seeds: int, jobs: int, inside: bool,
             },
         )
     click.echo(table(layouts, family))
-    for line in (*untimed(layouts, family), *rerouted(layouts)):
+    for line in (*untimed(layouts, family), *run_again(layouts)):
         click.echo(line)
     for name, reason in too_large.items():
         click.echo(f"{name}: {reason}")

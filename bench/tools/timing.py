@@ -141,8 +141,7 @@ def _case_of(unit: Component, beat: dict) -> tuple[Case, int]:
     for name, value in beat.items():
         beats[name] = PIXELS if name == "length" else value
     constants = None if ports.constants is None else np.zeros((), dtype_of(ports.constants))
-    lanes = getattr(getattr(unit, "model", None), "lanes", 1)
-    return Case(beats, constants), _BEATS * (-(-PIXELS // lanes) if "length" in beat else 1)
+    return Case(beats, constants), _BEATS * (PIXELS if "length" in beat else 1)
 
 
 def _codes(words: np.ndarray) -> list[int]:

@@ -18,6 +18,7 @@ from blysk.golden.presets import preset
 from blysk.hdl.bus.bus import BusUnit
 from blysk.hdl.emit.verilog import emit
 
+from ..decided import digest_of
 from .verilog_bench import SIMULATORS, missing_tool, without_initial_values
 
 SMALL = {"x_bits": 5, "y_bits": 5}
@@ -63,8 +64,11 @@ def case_of(unit, pipelined, seed=2026):
 
 
 @pytest.fixture
-def check(tmp_path, monkeypatch):
-    """Make a check that compares the Verilog of a core on a bus with its model."""
+def check(tmp_path, monkeypatch, decided):
+    """Make a check that compares the Verilog of a core on a bus with its model.
+
+    A run is repeated if the text, the case or the bench changes.
+    """
 
     def check(top, bus, simulator):
         if missing_tool(simulator):
@@ -76,6 +80,10 @@ def check(tmp_path, monkeypatch):
         (tmp_path / "core.v").write_text(text)
         case = case_of(unit, bus == "wishbone")
         assert len(case["data"]) > 100
+        bench = Path(__file__).with_name("bus_bench.py").read_text()
+        digest = digest_of("bus", simulator, text, bus, case, bench)
+        if decided.knows(digest):
+            return
         np.savez(tmp_path / "case.npz", bus=BUSES[bus], **case)
         monkeypatch.syspath_prepend(str(Path(__file__).parent))
         arguments = []
@@ -91,6 +99,7 @@ def check(tmp_path, monkeypatch):
             test_module="bus_bench", test_dir=tmp_path, results_xml=str(tmp_path / "results.xml"), **build
         )
         assert get_results(results) == (1, 0)
+        decided.add(digest)
 
     return check
 

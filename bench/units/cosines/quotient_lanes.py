@@ -72,7 +72,7 @@ RECORD = Record(
     title="Squares and linear functions of N/W along spans, two pixels a cycle",
     source="docs/theory/quotient.md#lanes",
     variants={
-        "N.H": Variant(partial(QuotientLanesUnit, QuotientLanes()), beat={"length": 64}),
+        "N.H": Variant(partial(QuotientLanesUnit, QuotientLanes())),
         "R.V": Variant(partial(QuotientLanesUnit, QuotientLanes(mirror=True)), long=True),
         "2 lights": Variant(partial(QuotientLanesUnit, QuotientLanes(2), 9), long=True),
         "2 lights, no highlights": Variant(

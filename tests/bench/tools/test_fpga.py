@@ -11,7 +11,7 @@ import pytest
 
 from blysk.bench.tools import fpga, place_and_route
 from blysk.bench.tools.families import ECP5, ECP5_85F, FAMILIES, NEXUS, Parts, Place
-from blysk.bench.tools.fpga import rerouted, table, untimed
+from blysk.bench.tools.fpga import run_again, table, untimed
 from blysk.bench.tools.place_and_route import Layout, lay_out
 from blysk.bench.tools.tool_runner import TooLarge
 from blysk.golden.normals.quadratic_evaluator import QUADRATIC_FORMS
@@ -91,8 +91,15 @@ def test_designs_with_an_untimed_interior_are_named():
 def test_designs_far_from_the_target_are_named():
     places = [Place(seed, 90.0, "a", "b", 1.0, 1.0, {}, 0, seed > 1) for seed in (1, 2, 3)]
     layouts = [Layout(f"{count} seeds", Parts(1, 2, 4, 0, 0), tuple(places[:count])) for count in (1, 3)]
-    (line,) = rerouted(layouts)
+    (line,) = run_again(layouts)
     assert line.startswith("3 seeds: with seed 2, 3 the target was out of reach")
+
+
+def test_designs_with_another_placer_are_named():
+    places = [Place(seed, 90.0, "a", "b", 1.0, 1.0, {}, default_placer=seed > 1) for seed in (1, 2)]
+    layouts = [Layout(f"{count} seeds", Parts(1, 2, 4, 0, 0), tuple(places[:count])) for count in (1, 2)]
+    (line,) = run_again(layouts)
+    assert line.startswith("2 seeds: with seed 2 the static placer found no place for block RAMs")
 
 
 @pytest.mark.parametrize("options", [[], ["--keep-registers"]])

@@ -220,7 +220,7 @@ def test_a_router_that_does_not_end_is_asked_for_less(slack, is_stuck, calls, ca
 
     def talks(self, name, code, arguments, folder, text="", watch=None):
         given.append("--tmg-ripup" in arguments)
-        if watch and (reason := watch(rounds(*slack))):
+        if "--tmg-ripup" in arguments and (reason := watch(rounds(*slack))):
             raise GivenUp(reason)
         run(self, name, code, arguments, folder, text)
 
@@ -231,6 +231,42 @@ def test_a_router_that_does_not_end_is_asked_for_less(slack, is_stuck, calls, ca
     assert layout.places[0].rerouted == is_stuck
     assert lay_out("counter", Counter(), 1) == layout
     assert given == [False, True, False][: 2 + is_stuck]
+
+
+def overlaps(*rounds):
+    return "".join(
+        f"Info: overlap: COMB={logic}%, FF={logic / 2}%, RAM={ram}%, MUL=0.0%\n" for logic, ram in rounds
+    )
+
+
+@pytest.mark.parametrize(
+    ("log", "is_crowded"),
+    [
+        ([(99.0, 90.0)] * 300, False),
+        ([(0.2, 20.0)] * 200, False),
+        ([(0.2, 20.0)] * 201, True),
+        ([*[(0.2, 20.0)] * 200, (5.5, 20.0)], False),
+    ],
+)
+def test_a_placer_that_does_not_end_is_replaced(log, is_crowded, calls, cache, monkeypatch):
+    """The static placer moves block RAMs to and fro when all else has a place."""
+    run, given = place_and_route.ToolRunner.run, []
+
+    def talks(self, name, code, arguments, folder, text="", watch=None):
+        if name == "nextpnr":
+            given.append("static" in arguments and "--placer" in arguments)
+            assert "--tmg-ripup" in arguments
+        if given[-1:] == [True] and (reason := watch(overlaps(*log))):
+            raise GivenUp(reason)
+        run(self, name, code, arguments, folder, text)
+
+    monkeypatch.setattr(place_and_route.ToolRunner, "run", talks)
+    monkeypatch.setattr(place_and_route, "_LARGE", 0)
+    layout = lay_out("counter", Counter(), 1)
+    assert layout.places[0].default_placer == is_crowded
+    assert not layout.places[0].rerouted
+    assert lay_out("counter", Counter(), 1) == layout
+    assert given == [True, False][: 1 + is_crowded]
 
 
 def test_another_design_family_or_tool_is_another_entry(calls, cache, monkeypatch):

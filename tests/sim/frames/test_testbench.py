@@ -24,6 +24,8 @@ from blysk.hdl.emit.verilog import port_widths
 from blysk.sim.cli.main import main
 from blysk.sim.frames.vectors import teapot_frame, vectors
 
+from ...decided import digest_of
+
 FILES = ["README.md", "blysk.v", "run.py", "test_core.py", "vectors"]
 TABLES = ["pixels.csv", "plan.json", "spans.csv", "status.csv", "writes.csv"]
 LAYERS = ("golden", "hdl", "sim", "bench")
@@ -75,6 +77,11 @@ def declared(text):
     top = text[re.search(r"^module ", text, re.MULTILINE).start() : text.index("endmodule")]
     found = re.findall(r"^  (?:input|output) (?:\[(\d+):0\] )?(\w+);", top, re.MULTILINE)
     return {port: int(high or 0) + 1 for high, port in found}
+
+
+def files_of(folder):
+    """Text of each file of a folder, by its path within."""
+    return {str(path.relative_to(folder)): path.read_text() for path in folder.rglob("*") if path.is_file()}
 
 
 def rows(path):
@@ -176,10 +183,16 @@ SMALL = ("--method", "linear", "--model", "cosquad", "--style", "compact")
         ("render", "wishbone", "verilator"),
     ],
 )
-def test_passes_for_every_core(run, tmp_path, top, bus, simulator):
-    """The bench of each core and bus passes. On own ports it sees one bit of its expected output."""
+def test_passes_for_every_core(run, tmp_path, decided, top, bus, simulator):
+    """The bench of each core and bus passes. On own ports it sees one bit of its expected output.
+
+    It runs again if a file of its folder changes.
+    """
     folder = tmp_path / "bench"
     assert main(["verilog", *SMALL, "--top", top, "--bus", bus, "--testbench", str(folder)]) == 0
+    digest = digest_of("bench", simulator, files_of(folder))
+    if decided.knows(digest):
+        return
     done = run(folder, simulator)
     assert done.returncode == 0, done.stdout
     assert "PASS=4 FAIL=0" in done.stdout
@@ -195,6 +208,7 @@ def test_passes_for_every_core(run, tmp_path, top, bus, simulator):
         done = run(folder)
         assert done.returncode == 1
         assert f"{made} 0: {names.split(',')[0]} is {codes[0]}, expected {codes[0] ^ 1}" in done.stdout
+    decided.add(digest)
 
 
 @pytest.mark.long
@@ -209,12 +223,16 @@ def test_passes_for_every_core(run, tmp_path, top, bus, simulator):
     ],
     ids=" ".join,
 )
-def test_passes_with_other_options(run, tmp_path, options):
+def test_passes_with_other_options(run, tmp_path, decided, options):
     folder = tmp_path / "bench"
     assert main(["verilog", *SMALL, *options, "--testbench", str(folder)]) == 0
+    digest = digest_of("bench", "icarus", files_of(folder))
+    if decided.knows(digest):
+        return
     done = run(folder)
     assert done.returncode == 0, done.stdout
     assert "PASS=4 FAIL=0" in done.stdout
+    decided.add(digest)
 
 
 @pytest.mark.long
