@@ -314,11 +314,11 @@ class Record:
         unit : Component
             Component of this variant.
         results : int
-            Least number of output beats. A run has at most `PAUSED` input beats, so it may give fewer.
+            Least number of output beats. A stimulus of 200 beats is the longest run, so it may give fewer.
         """
         make = next(iter(self.stimuli_of(variant).values())).make
         case = make(unit, np.random.default_rng(2026), 200)
-        for count in (results, 2 * results, 4 * results, 8 * results, PAUSED):
+        for count in (results, 2 * results, 4 * results, 8 * results, PAUSED, length_of(case.beats)):
             few = case.first(count)
             expected = self.expect(unit, few)
             if length_of(expected) >= results:
