@@ -109,15 +109,18 @@ boards: $(VENV)/.installed-release
 	done
 	$(BIN)/python docs/site/boards.py build/boards $(BOARDS)
 
-# The wheel is built from the source archive.
-release: boards
-	$(MAKE) site DOCS_OPTIONS="--boards build/boards"
-	rm -rf dist
-	$(BIN)/python -m build $(BUILD_OPTIONS)
-	cp $(foreach board,$(BOARDS),build/boards/$(board)/*.bit) dist
-	tar -czf dist/blysk-$(VERSION)-site.tar.gz site
-	cd dist && $(SHA256) * > ../build/SHA256SUMS
-	mv build/SHA256SUMS dist
+# The wheel is built from the source archive. The folder dist appears when every file in it is made.
+# BOARDS= leaves out the bitstreams.
+release: $(VENV)/.installed-release
+	rm -rf dist build/dist
+	$(if $(strip $(BOARDS)),$(MAKE) boards)
+	$(MAKE) site DOCS_OPTIONS="$(if $(strip $(BOARDS)),--boards build/boards)"
+	$(BIN)/python -m build $(BUILD_OPTIONS) -o build/dist
+	$(if $(strip $(BOARDS)),cp $(foreach board,$(BOARDS),build/boards/$(board)/*.bit) build/dist)
+	tar -czf build/dist/blysk-$(VERSION)-site.tar.gz site
+	cd build/dist && $(SHA256) * > ../SHA256SUMS
+	mv build/SHA256SUMS build/dist
+	mv build/dist dist
 
 # Measures the sections of the report that the paper takes, with pictures of full size; this takes hours.
 # PAPER_OPTIONS=--quick takes small pictures, in minutes.

@@ -1,6 +1,7 @@
-"""The installation of a user: the wheel, its contents, and renders with the oldest versions that it
-allows."""
+"""The installation of a user: the wheel of the source archive, its contents, an environment without a
+compiler, and renders with the oldest versions that it allows."""
 
+import json
 import os
 import re
 import shutil
@@ -9,12 +10,14 @@ import sys
 import tarfile
 import tomllib
 import zipfile
+from importlib.metadata import Distribution, distribution, entry_points
 from itertools import chain
 from pathlib import Path
 
 import numpy as np
 import pytest
 from packaging.requirements import Requirement
+from packaging.utils import canonicalize_name
 from PIL import Image
 
 import blysk
@@ -63,10 +66,17 @@ def source(tmp_path_factory):
 
 
 @pytest.fixture(scope="module")
-def wheel(source, tmp_path_factory):
-    folder = tmp_path_factory.mktemp("wheel")
-    run(sys.executable, "-m", "pip", "wheel", "-q", "--no-deps", "-w", folder, source)
-    (path,) = folder.glob("*.whl")
+def archives(source, tmp_path_factory):
+    """Folder with the source archive, and the wheel that was built from the unpacked archive."""
+    pytest.importorskip("build", reason="build is not installed")
+    folder = tmp_path_factory.mktemp("archives")
+    run(sys.executable, "-m", "build", "--no-isolation", "-o", folder, source)
+    return folder
+
+
+@pytest.fixture(scope="module")
+def wheel(archives):
+    (path,) = archives.glob("*.whl")
     return path
 
 
@@ -105,12 +115,9 @@ def test_wheel_holds_the_packages_and_no_more(wheel):
 
 @pytest.mark.ci
 @pytest.mark.long
-def test_source_archive_has_every_file_and_makes_the_same_wheel(source, wheel, tmp_path):
-    """The wheel is built from the unpacked archive, without the clone."""
-    pytest.importorskip("build", reason="build is not installed")
-    build = ("-m", "build", "--no-isolation", "-o", tmp_path)
-    run(sys.executable, *build, source)
-    (archive,), (other,) = tmp_path.glob("*.tar.gz"), tmp_path.glob("*.whl")
+def test_source_archive_has_every_file_and_makes_the_same_wheel(source, archives, wheel, tmp_path):
+    """The wheel of the archive equals a wheel of the clone."""
+    (archive,) = archives.glob("*.tar.gz")
     with tarfile.open(archive) as files:
         names = {name.partition("/")[2] for name in files.getnames()}
     assert set(committed()) - names == set()
@@ -118,23 +125,45 @@ def test_source_archive_has_every_file_and_makes_the_same_wheel(source, wheel, t
         name.split("/")[0] for name in committed()
     }
     assert added <= {"", "PKG-INFO", "setup.cfg", "blysk.egg-info"}
+    run(sys.executable, "-m", "pip", "wheel", "-q", "--no-deps", "-w", tmp_path, source)
+    (other,) = tmp_path.glob("*.whl")
     with zipfile.ZipFile(wheel) as one, zipfile.ZipFile(other) as two:
         assert {name: one.read(name) for name in one.namelist()} == {
             name: two.read(name) for name in two.namelist()
         }
 
 
+def required() -> dict[str, Distribution]:
+    """What pip installs with the wheel and without an extra, by name, as this environment has it."""
+    found: dict[str, Distribution] = {}
+    asked = [Requirement(text) for text in metadata()["dependencies"]]
+    while asked:
+        one = asked.pop()
+        name = canonicalize_name(one.name)
+        extras = ("", *one.extras)
+        wanted = one.marker is None or any(one.marker.evaluate({"extra": extra}) for extra in extras)
+        if wanted and name not in found:
+            found[name] = distribution(name)
+            asked += map(Requirement, found[name].requires or ())
+    return found
+
+
 @pytest.fixture(scope="module")
 def installed(wheel, tmp_path_factory):
-    """Python of a new environment with the wheel and the libraries of this environment."""
+    """Python of a new environment without pip, which has the wheel and its libraries.
+
+    The libraries are links to those of this environment: what the wheel requires, and what this requires. So
+    neither extras, such as the compiler of ``native``, nor this checkout are there.
+    """
     folder = tmp_path_factory.mktemp("installed")
     run(sys.executable, "-m", "venv", "--without-pip", folder)
     python = folder / "bin" / "python"
     run(sys.executable, "-m", "pip", "--python", python, "install", "-q", "--no-deps", "--no-index", wheel)
     (site,) = folder.glob("lib/python*/site-packages")
-    # A path in a .pth file is searched. Its own .pth files, such as that of this checkout, are not read.
-    libraries = [path for path in sys.path if Path(path).name in ("site-packages", "dist-packages")]
-    (site / "libraries.pth").write_text("\n".join(libraries))
+    for of in required().values():
+        for top in {file.parts[0] for file in of.files or ()} - {"..", "__pycache__"}:
+            if not (site / top).is_symlink():
+                (site / top).symlink_to(of.locate_file(top))
     return python
 
 
@@ -174,6 +203,47 @@ def test_wheel_in_a_project_with_packages_of_the_same_names(installed, tmp_path)
     where, _, verilog = run(installed, "-c", _UNIT, cwd=tmp_path).partition("\n")
     assert Path(where).is_relative_to(installed.parents[1])
     assert "endmodule" in verilog
+
+
+_BARE = """
+import importlib.util
+import blysk
+print(blysk.__file__, importlib.util.find_spec("ziglang"))
+"""
+
+
+@pytest.mark.ci
+@pytest.mark.long
+def test_wheel_on_a_bare_machine(installed, tmp_path):
+    """Without a compiler, a source tree and a cache. The picture is that of the compiled engine."""
+    program, home = installed.with_name("blysk"), tmp_path / "home"
+    home.mkdir()
+    bare = {"env": {"PATH": str(installed.parent), "HOME": str(home)}, "cwd": tmp_path}
+    assert not [name for name in ("c++", "g++", "clang++") if shutil.which(name, path=bare["env"]["PATH"])]
+    where, zig = run(installed, "-c", _BARE, **bare).split()
+    assert Path(where).is_relative_to(installed.parents[1])
+    assert zig == "None"
+    size = ("render", "teapot", "--size", "160x120", "--json", tmp_path / "a.json", "-o")
+    done = subprocess.run([program, *size, "a.png"], capture_output=True, text=True, **bare)
+    assert done.returncode == 0, done.stderr
+    # One line tells the engine, why, and a remedy. Others tell the progress.
+    (line,) = (line for line in done.stderr.splitlines() if "warning" in line)
+    expected = "blysk: warning: pysim at 160x120 instead of cxxrtl, no working C++ compiler (tried c++, "
+    assert line.startswith(expected)
+    assert "pip install 'blysk[native] @ file://" in line
+    assert json.loads((tmp_path / "a.json").read_text())["engine"] == "pysim"
+    run(sys.executable, "-m", "blysk", *size, tmp_path / "b.png", "--engine", "cxxrtl")
+    assert json.loads((tmp_path / "a.json").read_text())["engine"] == "cxxrtl"
+    ours, other = (np.asarray(Image.open(tmp_path / name)) for name in ("a.png", "b.png"))
+    assert ours.shape == (120, 160, 3)
+    np.testing.assert_array_equal(ours, other)
+    assert run(program, "verilog", **bare).rstrip().endswith("endmodule")
+    commands = {entry.name for entry in entry_points(group="blysk.commands")} | {"render", "verilog"}
+    assert set(re.findall(r"^  (\w+)  ", run(program, "--help", **bare), re.M)) == commands
+    # A command of an extra names what is missing, and how to install it from this wheel.
+    done = subprocess.run([program, "fpga"], capture_output=True, text=True, **bare)
+    assert (done.returncode, done.stdout, done.stderr.count("\n")) == (2, "", 1)
+    assert "pip install 'blysk[fpga] @ file://" in done.stderr
 
 
 _USER = """
