@@ -20,6 +20,8 @@ class Board:
     ----------
     name : str
         Name on the command line.
+    revisions : str
+        Revisions of the board that have the pins of the platform.
     module, platform : str
         Module and class in `amaranth_boards`.
     options : tuple of str
@@ -45,6 +47,7 @@ class Board:
     """
 
     name: str
+    revisions: str
     module: str
     platform: str
     options: tuple[str, ...]
@@ -83,7 +86,7 @@ BOARDS = {
     board.name: board
     for board in (
         Board(
-            *("ulx3s-25f", "ulx3s", "ULX3S_25F_Platform"),
+            *("ulx3s-25f", "2.x and 3.0", "ulx3s", "ULX3S_25F_Platform"),
             options=("--25k", "--package", "CABGA381", "--speed", "6"),
             reference=25_000_000,
             buttons=_ULX3S_BUTTONS,
@@ -98,7 +101,7 @@ BOARDS = {
             "all 56 block RAMs. It took 15 minutes of one core, and meets every clock",
         ),
         Board(
-            *("ulx3s-85f", "ulx3s", "ULX3S_85F_Platform"),
+            *("ulx3s-85f", "2.x and 3.0", "ulx3s", "ULX3S_85F_Platform"),
             options=("--85k", "--package", "CABGA381", "--speed", "6"),
             reference=25_000_000,
             buttons=_ULX3S_BUTTONS,
@@ -114,7 +117,7 @@ BOARDS = {
             "gave a bitstream at the first placement, on a third of the device",
         ),
         Board(
-            *("icepi-zero", "icepi_zero", "IcepiZero1_3Platform"),
+            *("icepi-zero", "1.3 and 1.4", "icepi_zero", "IcepiZero1_3Platform"),
             options=("--25k", "--package", "CABGA256", "--speed", "6"),
             reference=50_000_000,
             buttons=(("button", 0), ("button", 1)),

@@ -37,9 +37,14 @@ compare the monitor with the picture of the board. No bitstream has been on a bo
 
 ## To load a bitstream
 
-1. Check the files in their folder: `sha256sum -c --ignore-missing SHA256SUMS`.
-2. Connect the monitor to the board, then the board to the computer.
-3. Run the command of your board, below. openFPGALoader writes the FPGA's memory. Without power the FPGA loses
+1. Compare the revision that is printed on your board with the table of the board, below. Other revisions may
+   have the clock or the connector at other pins. They then show nothing.
+2. Check the files in their folder: `sha256sum -c --ignore-missing SHA256SUMS`.
+3. Install [openFPGALoader](https://trabucayre.github.io/openFPGALoader/guide/install.html).
+   `openFPGALoader --list-boards` must list the name that stands after `-b` in the command of your board.
+   Older versions do not know `icepi-zero`.
+4. Connect the monitor to the board, then the board to the computer.
+5. Run the command of your board, below. openFPGALoader writes the FPGA's memory. Without power the FPGA loses
    the bitstream.
 
 ## What to look for
@@ -68,6 +73,7 @@ to the bit.
 | --- | --- |
 | file | `{file}`, {bytes:,} bytes |
 | SHA-256 | `{digest}` |
+| revisions of the board | {revisions} |
 | mesh | {triangles} triangles |
 | cycles a frame | {cycles:,} at {clock:g} MHz, {late} late bands |
 {clocks}
@@ -121,6 +127,7 @@ def _board(folder: Path, name: str) -> str:
         frame=FRAME,
         bytes=len(content),
         digest=hashlib.sha256(content).hexdigest(),
+        revisions=BOARDS[name].revisions,
         triangles=entry.split(", ")[-1].removesuffix(" triangles"),
         cycles=simulated["cycles"],
         clock=simulated["clock"],

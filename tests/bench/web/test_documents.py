@@ -176,6 +176,7 @@ def test_page_of_the_boards(board_page, tmp_path, capsys):
     assert "blysk-0-ulx3s-25f.bit" in page
     assert hashlib.sha256(b"bits").hexdigest() in page
     assert "openFPGALoader -b ulx3s " in page
+    assert "| revisions of the board | 2.x and 3.0 |" in page
     assert "(ulx3s-25f/frame-0001.png)" in page
     assert "65.0 MHz, needed 52.5" in page
     assert "[ ] The mesh turns without jumps." in page
