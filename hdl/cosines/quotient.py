@@ -73,6 +73,9 @@ class QuotientUnit(PipelinedUnit):
         Bit-accurate model.
     initiation_interval : int
         Cycles from an input to the next, at least 1.
+    memories : bool
+        Whether words that wait for some cycles are in memories of look-up tables. If not, they are in
+        flip-flops. Only at an interval of 1.
 
     Members
     -------
@@ -84,9 +87,9 @@ class QuotientUnit(PipelinedUnit):
     Source: docs/theory/quotient.md#pixel.
     """
 
-    def __init__(self, model: Quotient | None = None, initiation_interval: int = 1):
+    def __init__(self, model: Quotient | None = None, initiation_interval: int = 1, memories: bool = True):
         self.model = p = model or Quotient()
-        self._graph = Dataflow(initiation_interval, memories=True)
+        self._graph = Dataflow(initiation_interval, memories=memories)
         self._results = self._describe()
         super().__init__(
             pixel_words_shape(p.spans),

@@ -92,7 +92,9 @@ class QuotientInterpolatorUnit(InterpolatorUnit, model=QuotientInterpolator):
         else:
             # If a pixel takes several cycles, one multiplier has enough time for a span.
             self._spans = QuotientSpansUnit(spans, self.length_bits, serial=self.product_interval > 1)
-        self._quotients = [QuotientUnit(Quotient(spans), self.product_interval) for _ in range(self.lanes)]
+        # A pipeline of several lanes has more look-up tables than flip-flops.
+        memories, quotient = self.lanes == 1, Quotient(spans)
+        self._quotients = [QuotientUnit(quotient, self.product_interval, memories) for _ in range(self.lanes)]
         self._quotient = self._quotients[0]
         self.setup_interval = self._spans.initiation_interval
         self.cycles_per_pixel = self.product_interval

@@ -133,6 +133,7 @@ RECORD = Record(
             partial(QuotientUnit, Quotient(QuotientSpans(2, highlights=False))), long=True
         ),
         "interval 3": Variant(partial(QuotientUnit, _DEFAULT, 3), long=True),
+        "without memories": Variant(partial(QuotientUnit, _DEFAULT, memories=False), long=True),
         "2 lights of R.V, interval 2": Variant(
             partial(QuotientUnit, Quotient(QuotientSpans(2, mirror=True)), 2), long=True
         ),
