@@ -35,7 +35,7 @@ PIPES = (1, 2, 4, 8)
 LANES = (1, 2)
 """Numbers of lanes of a shading pipeline: pixels in a beat."""
 
-SETUPS = (1, 2)
+SETUPS = (1, 2, 4)
 """Numbers of lanes of triangle setup."""
 
 TOPS = ("shader", "geometry", "render")
@@ -98,7 +98,7 @@ class Build:
         Whether several pipelines give one stream of pixels in place of a stream each.
     top : {"shader", "geometry", "render"}
         The core: spans to pixels, triangles to spans, or triangles to pixels.
-    setups : {1, 2}
+    setups : {1, 2, 4}
         Lanes of triangle setup of a core that takes triangles.
     geometry_style : {"throughput", "compact"} or None
         Style of the geometry of a core that takes triangles; ``None``: ``style``.

@@ -6,6 +6,7 @@ from amaranth.hdl import Const, Module, Signal, Value, unsigned
 from amaranth.lib import data, stream, wiring
 from amaranth.lib.wiring import In, Out
 
+from blysk.golden.build import Build
 from blysk.golden.geometry.geometry import COUNTERS
 from blysk.golden.geometry.span_attributes import DEPTH_STEP, SPAN_DEPTH
 from blysk.golden.render import Renderer
@@ -25,7 +26,7 @@ from blysk.hdl.geometry.triangles import COUNTER_BITS, counters_shape, frame_sha
 from blysk.hdl.pipeline import ShadingPipelineUnit
 from blysk.hdl.port_descriptions import COUNTER_TEXTS, TEXTURE_TEXTS
 
-__all__ = ["PORT_DESCRIPTIONS", "STATUS", "WAITING_SPANS", "RendererUnit"]
+__all__ = ["PORT_DESCRIPTIONS", "STATUS", "WAITING_SPANS", "RendererUnit", "waiting_spans"]
 
 STATUS = (*COUNTERS, "spans", "pixels", "hidden", "dropped", "out_of_range_spans")
 """Counters of `RendererUnit`."""
@@ -78,13 +79,34 @@ on long spans, geometry goes on. The compact style has this FIFO only if spans h
 coarse test. In other compact designs one span waits in a register.
 """
 
+_OF_LANES = 4
+"""Factor of `WAITING_SPANS` for several lanes of triangle setup in the throughput style.
+
+They are faster than shading except in runs of triangles of few pixels. For these runs more spans wait.
+"""
+
+_BEHIND = 511
+"""Limit of the number of spans that are inside behind the FIFO of spans."""
+
+
+def waiting_spans(build: Build) -> int:
+    """Spans that may wait between geometry and shading: `WAITING_SPANS`, or more with several lanes of setup.
+
+    Parameters
+    ----------
+    build : Build
+        Build options of a core from triangles to pixels.
+    """
+    several = build.setups > 1 and not build.compact_geometry
+    return WAITING_SPANS * (_OF_LANES if several else 1)
+
 
 class RendererUnit(wiring.Component):
     """Turns triangles into the pixels to write. `Renderer` is the bit-accurate model.
 
     `GeometryUnit` turns triangles into spans, `ShadingPipelineUnit` turns spans into pixels, and
     `DepthTesterUnit` drops hidden pixels. Spans wait for the pipeline in a FIFO or a register
-    (`WAITING_SPANS`). The depths of the spans go beside the pipeline, in another FIFO. With a coarse depth
+    (`waiting_spans`). The depths of the spans go beside the pipeline, in another FIFO. With a coarse depth
     test a span also waits for the test's answer. Then the pipeline takes the span, or the unit drops it in
     one cycle. The units work at the same time. If no unit waits for long, a frame takes as many cycles as the
     slowest unit alone. The design's `Build` has the styles, the lanes of triangle setup and the coarse test.
@@ -189,17 +211,19 @@ class RendererUnit(wiring.Component):
             source.ready.eq(made.ready & room),
         ]
         known, drops = self._judge(m, source, room, made.ready, ready)
+        room_for = waiting_spans(self.model.design.build)
         if geometry.compact and not geometry.vectors and self.coarse is None:
             # Geometry is slower than shading here, so spans hardly wait. The look-up tables of a FIFO would
             # cost as much as the register that it replaces.
             connect_register(m, "waiting_span", made, ready)
         else:
-            connect_late_fifo(m, "spans", made, ready, WAITING_SPANS)
+            connect_late_fifo(m, "spans", made, ready, room_for)
         given, dropped = Signal(name="given"), Signal(name="dropped")
         count = Signal(COUNTER_BITS, name="count_spans")
         with m.If(pipeline.i.valid & pipeline.i.ready):
             m.d.sync += count.eq(count + 1)
-        spans = moving(m, "spans", made, depth.i, pixel_last := Signal(name="pixel_last"), dropped)
+        pixel_last = Signal(name="pixel_last")
+        spans = moving(m, "spans", made, depth.i, pixel_last, dropped, room_for + _BEHIND)
         m.d.comb += [
             pixel_last.eq(depth.i.payload.pixel.last),
             self.idle.eq(geometry.idle & depth.idle & ~spans),
@@ -315,7 +339,7 @@ class RendererUnit(wiring.Component):
         with m.If(coarse.i.valid & coarse.i.ready):
             m.d.sync += [number.eq(place.picture), turned.eq(0)]
         answers = stream.Signature(1).create(path=("answers",))
-        connect_late_fifo(m, "answers", coarse.o, answers, WAITING_SPANS)
+        connect_late_fifo(m, "answers", coarse.o, answers, waiting_spans(self.model.design.build))
         m.d.comb += [
             # A design may have fewer bits of coordinates than geometry.
             *(place[name].eq(span.payload[name]) for name in ("x", "y", "length")),

@@ -2,11 +2,12 @@
 
 import numpy as np
 
+from blysk.golden.build import Build
 from blysk.golden.geometry.geometry import Geometry
 from blysk.golden.geometry.triangles import FrameSettings, Triangles
 from blysk.golden.geometry.vertex_sort import VertexSort
 from blysk.hdl.geometry.vertex_sort import WAITING_TRIANGLES
-from blysk.hdl.render import WAITING_SPANS
+from blysk.hdl.render import waiting_spans
 
 __all__ = ["triangle_cycles"]
 
@@ -46,6 +47,7 @@ def triangle_cycles(
     interval : int
         Least cycles from a triangle to the next in a lane.
     """
+    waiting = waiting_spans(Build(top="render", setups=setups))
     drawn, rows, owner, _ = geometry.rows(triangles, frame)
     length = rows.length.tolist()
     ends = np.searchsorted(owner, np.arange(len(drawn)), side="right").tolist()
@@ -76,8 +78,8 @@ def triangle_cycles(
         while row < ends[k]:
             pixels = length[row]
             if pixels:
-                if len(shaded) >= WAITING_SPANS:
-                    now = max(now, shaded[-WAITING_SPANS])
+                if len(shaded) >= waiting:
+                    now = max(now, shaded[-waiting])
                 shaded.append(max(now + _SPAN, done))
                 done = shaded[-1] + pixels
             now += max(1, (pixels - 1).bit_length() if pixels else 1)

@@ -224,13 +224,14 @@ def moving(
     sink: stream.Interface,
     last: ValueLike = 1,
     dropped: ValueLike = 0,
+    most: int = 1023,
 ) -> Value:
     """Whether payloads are between two streams: whether more payloads went in than came out.
 
     Parameters
     ----------
     m : Module
-        Module that gets the counter, of at most 1023.
+        Module that gets the counter.
     name : str
         First part of the counter's name.
     source, sink : stream.Interface
@@ -239,8 +240,10 @@ def moving(
         Whether the outgoing beat is the last, or only, part of a payload.
     dropped : ValueLike
         Whether a payload ends between the two streams.
+    most : int
+        The counter counts at least so many payloads.
     """
-    inside = Signal(10, name=f"{name}_inside")
+    inside = Signal(range(most + 1), name=f"{name}_inside")
     enters, leaves = source.valid & source.ready, sink.valid & sink.ready & last
     m.d.sync += inside.eq(inside + enters - leaves - dropped)
     return inside.any()

@@ -160,7 +160,7 @@ class _TriangleSetup(wiring.Component):
 
 
 class GeometryUnit(wiring.Component):
-    """Triangles to spans, at most a triangle in 8 or 16 cycles and a span a cycle. `Geometry` is the model.
+    """Triangles to spans, a triangle in 4, 8 or 16 cycles and a span a cycle. `Geometry` is the model.
 
     The unit has the units of this package in a row. The corners of a sorted triangle go to the edge setup.
     They also go to a FIFO, one attribute after the other. There the attributes wait for the scales of their
@@ -175,7 +175,7 @@ class GeometryUnit(wiring.Component):
     The units work on several triangles at the same time, and the slowest unit sets the pace. A triangle
     takes:
 
-    - in the setup `interval` cycles if it is drawn: 16, or 48 in the compact style, and half as many with two
+    - in the setup `interval` cycles if it is drawn: 16, or 48 in the compact style, divided by the number of
       lanes. Each attribute of a surface, and its 1/W, adds 4 cycles, or 12 in the compact style. A triangle
       that the sort drops takes a cycle (`VertexSortUnit`), or 5 to 15 in the compact style
       (`SerialVertexSortUnit`);
@@ -192,7 +192,7 @@ class GeometryUnit(wiring.Component):
       (`SerialVectorsUnit`).
 
     The number of multipliers is `multipliers`: 16, or 5 in the compact style. With ``lines`` or ``vectors``
-    it is 10, or 2 in the compact style. The second lane adds 4, or 2 in the compact style.
+    it is 10, or 2 in the compact style. Each further lane adds 4, or 2 in the compact style.
 
     Parameters
     ----------
@@ -300,7 +300,7 @@ class GeometryUnit(wiring.Component):
             connect(m, drawn, lanes[0].i)
             return lanes[0].walks, lanes[0].planes
         turn = _turns(m, "lane", drawn, len(lanes))
-        # A triangle waits before each lane. Without these registers, two lanes that accept on the same cycles
+        # A triangle waits before each lane. Without these registers, lanes that accept on the same cycles
         # would together have the rate of one lane.
         dealt = [_between(f"dealt_{k}", drawn) for k in range(len(lanes))]
         for k, (to, lane) in enumerate(zip(dealt, lanes, strict=True)):

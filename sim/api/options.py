@@ -375,7 +375,7 @@ BUILD: dict[str, Option] = {
     "setups": Option(
         Few(*SETUPS),
         1,
-        "Lanes of triangle setup in hardware geometry. Two lanes take small triangles twice as fast.",
+        "Lanes of triangle setup in hardware geometry. N lanes take small triangles N times as fast.",
         "pipeline.setups",
     ),
     "coarse": Option(
@@ -476,7 +476,7 @@ class SharedOptions(TypedDict, total=False):
     geometry: Literal["software", "hardware"]
     lanes: Literal[1, 2]
     pipes: Literal[1, 2, 4, 8]
-    setups: Literal[1, 2]
+    setups: Literal[1, 2, 4]
 
 
 class BuildOptions(SharedOptions, total=False):

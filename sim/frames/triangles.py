@@ -24,7 +24,7 @@ from blysk.golden.render import Renderer
 from blysk.hdl.core.stream import connect
 from blysk.hdl.geometry.triangles import counters_shape
 from blysk.hdl.geometry.vertex_sort import WAITING_TRIANGLES
-from blysk.hdl.render import STATUS, WAITING_SPANS, RendererUnit
+from blysk.hdl.render import STATUS, RendererUnit, waiting_spans
 from blysk.sim.engines.engine import SimulationError
 from blysk.sim.engines.simulate import simulate
 from blysk.sim.frames.frame import sample_constants
@@ -41,7 +41,8 @@ LARGEST_PICTURE = 1 << 21
 """Pixels of the largest simulated memory of depths. Each takes 3 kB while the model is built."""
 
 _IN_UNITS = 26
-"""Largest number of triangles inside the hardware, except in FIFOs of the throughput style."""
+"""Largest number of triangles inside the hardware for each lane of setup, except in FIFOs of the throughput
+style."""
 
 _PAUSE = 10_000
 """Cycles without a beat after which a picture counts as finished, if no triangle is hidden."""
@@ -327,7 +328,9 @@ class TriangleSimulator:
         geometry, frame, steps = self._render.geometry, sent.frame, self.renderer.geometry.grid.steps
         drawn, _ = VertexSort(geometry.grid, geometry.model.tested).compute(sent.triangles, frame)
         triangles = drawn.triangles
-        inside = _IN_UNITS + WAITING_SPANS + (0 if geometry.compact else WAITING_TRIANGLES)
+        build = self.renderer.design.build
+        inside = _IN_UNITS * build.setups + waiting_spans(build)
+        inside += 0 if geometry.compact else WAITING_TRIANGLES
         sides = []
         for values, first, end in (
             (triangles.x, frame.left, frame.right),

@@ -19,7 +19,7 @@ COARSE = CoarseDepth(64, 48)
         ({"lanes": 3}, "lanes must be one of 1, 2, not 3"),
         ({"pipes": 3}, "pipes must be one of 1, 2, 4, 8, not 3"),
         ({"top": "gpu"}, "top must be one of shader, geometry, render, not 'gpu'"),
-        ({"setups": 0}, "setups must be one of 1, 2, not 0"),
+        ({"setups": 0}, "setups must be one of 1, 2, 4, not 0"),
         ({"geometry_style": ""}, "geometry_style must be one of throughput, compact, not ''"),
         ({"bus": "apb"}, "bus must be one of native, axi, wishbone, not 'apb'"),
         ({"exponent": 0}, "exponent must be 1 to"),

@@ -1,5 +1,6 @@
 """Geometry and renderer say that they are empty only if they are. Units that draw in bands rely on this."""
 
+from dataclasses import replace
 from functools import partial
 
 import numpy as np
@@ -12,10 +13,11 @@ from blysk.bench.quality.mutation import Wrapped
 from blysk.bench.units.record import length_of
 from blysk.bench.units.registry import RECORDS
 from blysk.golden.build import Build
+from blysk.golden.geometry.triangles import GRID
 from blysk.golden.presets import preset
 from blysk.golden.render import Renderer
 from blysk.hdl.geometry.geometry import GeometryUnit
-from blysk.hdl.render import RendererUnit
+from blysk.hdl.render import RendererUnit, waiting_spans
 from blysk.sim.engines.simulate import simulate
 
 from ..checks import assert_beats_equal
@@ -88,3 +90,65 @@ def test_empty_is_empty(name):
         assert_beats_equal(found.beats, expected)
         assert found.status["taken"] == 100
         assert found.status["wrong"] == 0
+
+
+class Owing(Wrapped):
+    """A unit whose triangles have a pixel each.
+
+    ``status.wrong`` counts the cycles in which the unit says that it is empty, and a pixel is due.
+    """
+
+    def __init__(self, unit):
+        super().__init__(unit, status=Out(data.StructLayout({"wrong": unsigned(32), "most": unsigned(32)})))
+
+    def elaborate(self, platform):
+        m = super().elaborate(platform)
+        m.submodules.unit = unit = self.unit
+        owed = Signal(32)
+        enters, leaves = unit.i.valid & unit.i.ready, unit.o.valid & unit.o.ready
+        m.d.sync += [
+            owed.eq(owed + enters - leaves),
+            self.status.wrong.eq(self.status.wrong + (unit.idle & owed.any())),
+        ]
+        with m.If(owed > self.status.most):
+            m.d.sync += self.status.most.eq(owed)
+        return m
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("setups", [1, 2])
+def test_full_is_not_empty(setups):
+    """While the FIFO of spans fills, one triangle of a pixel after the other, the unit is never empty.
+
+    Geometry is empty before each triangle, so only the count of spans tells.
+    """
+    unit = RendererUnit(Renderer(DESIGN.built(top="render", setups=setups)), (32, 24))
+    record, room = RECORDS["render"], waiting_spans(unit.model.design.build)
+    assert room == {1: 512, 2: 2048}[setups]
+    number, pace = np.arange(room + 100), 300
+    case = next(iter(record.stimuli.values())).make(unit, np.random.default_rng(2026), len(number))
+    place = np.array([case.constants[name] for name in ("left", "top")])
+    x, y = ((place + np.stack((number % 32, number // 32 % 24), axis=1)) * GRID.steps + GRID.steps // 2).T
+    # Later triangles are nearer, so that every pixel is written.
+    corners = {
+        "x": x[:, np.newaxis] + np.array([-90, 90, 0]),
+        "y": y[:, np.newaxis] + np.array([-90, -90, 90]),
+        "depth": np.repeat(1 << 22, 3) - 100 * number[:, np.newaxis],
+    }
+    case = replace(case, beats=case.beats | corners, constants=case.constants | {"back_faces": 0})
+    expected, owing = record.expect(unit, case), Owing(unit)
+    assert length_of(expected) == len(number)
+    # The triangles come while the output waits.
+    found = simulate(
+        owing,
+        case.beats,
+        count=len(number),
+        **case.sent,
+        input_stalls=np.arange(pace) > 0,
+        output_stalls=np.arange(2 * pace * len(number)) < pace * (len(number) + 1),
+        idle_timeout=50_000 + pace * 200,
+        engine="auto",
+    )
+    assert_beats_equal(found.beats, expected)
+    assert found.status["most"] > room
+    assert found.status["wrong"] == 0

@@ -114,6 +114,7 @@ RECORD = Record(
         "true lines": Variant(_unit(Geometry(lines=True)), long=True),
         "vectors": Variant(_unit(Geometry(vectors=True)), long=True),
         "two lanes": Variant(_unit(setups=2), long=True),
+        "vectors, four lanes": Variant(_unit(Geometry(vectors=True), setups=4), long=True),
         "vectors, colours, textures": Variant(_unit(Geometry(vectors=True, surface=_BOTH)), long=True),
         "compact, vectors, colours, textures": Variant(
             _unit(Geometry(vectors=True, surface=_BOTH), style="compact"), long=True

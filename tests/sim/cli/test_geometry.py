@@ -177,7 +177,7 @@ UNKNOWN = "use one of software, hardware"
         ((*VERILOG, *HARDWARE, *LOCAL), "", "takes values"),
         ((*VERILOG, "--coarse", "64x48"), "--coarse", "also give top render"),
         ((*VERILOG, "--setups", "2"), "--setups 2", NO_SETUP + "use top geometry or render"),
-        ((*VERILOG, "--setups", "3"), "--setups 3", "give one of 1, 2"),
+        ((*VERILOG, "--setups", "3"), "--setups 3", "give one of 1, 2, 4"),
     ],
 )
 def test_what_is_refused(refused, arguments, thing, says):
