@@ -92,7 +92,7 @@ class QuotientInterpolatorUnit(InterpolatorUnit, model=QuotientInterpolator):
         else:
             # If a pixel takes several cycles, one multiplier has enough time for a span.
             self._spans = QuotientSpansUnit(spans, self.length_bits, serial=self.product_interval > 1)
-        # A pipeline of several lanes has more look-up tables than flip-flops.
+        # Memories of several lanes would take many look-up tables.
         memories, quotient = self.lanes == 1, Quotient(spans)
         self._quotients = [QuotientUnit(quotient, self.product_interval, memories) for _ in range(self.lanes)]
         self._quotient = self._quotients[0]
