@@ -360,8 +360,10 @@ def paper(data: Mapping[str, Any], folder: Path) -> bytes:
         raise InputError("typst", "the library that sets the paper is missing", remedy) from None
     # Drawings need a library of another extra, and bad arguments are told without them.
     from blysk.bench.quality.paper_claims import check
-    from blysk.bench.quality.paper_drawings import draw_exponents, draw_front, draw_pipeline
+    from blysk.bench.quality.paper_drawings import MOST_SHOWN, draw_exponents, draw_front, draw_pipeline
 
+    above = [row for row in data["methods"] if row["error"] > MOST_SHOWN]
+    data = {**data, "above": above}
     check(data, SOURCE.read_text(encoding="utf-8"))
     folder.mkdir(parents=True, exist_ok=True)
     shutil.copy(SOURCE, folder / SOURCE.name)

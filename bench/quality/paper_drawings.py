@@ -13,7 +13,7 @@ from matplotlib.ticker import NullLocator
 from blysk.bench.labels import Label, place_labels
 from blysk.bench.svg import panels
 
-__all__ = ["STAGES", "draw_exponents", "draw_front", "draw_pipeline"]
+__all__ = ["MOST_SHOWN", "STAGES", "draw_exponents", "draw_front", "draw_pipeline"]
 
 STAGES = (
     ("span\nv, d, e", 0),
@@ -27,6 +27,9 @@ STAGES = (
     ("pixel", 0),
 )
 """Text and multipliers of each box in the drawing of the datapath, from left to right."""
+
+MOST_SHOWN = 0.7
+"""Largest error in the drawing of methods, in LSB."""
 
 
 def _write(figure: Figure, path: Path) -> None:
@@ -71,9 +74,11 @@ def draw_front(path: Path, rows: Sequence[Mapping[str, Any]]) -> None:
         The PDF to write.
     rows : sequence of dict
         ``method``, ``model``, ``error`` in LSB and ``cycles`` a pixel of each method, the most exact first.
+        Errors over `MOST_SHOWN` are not drawn.
     """
-    figure, (axes,) = panels(3.4, 2.9)
+    figure, (axes,) = panels(3.4, 3.1)
     labels: dict[str, Label] = {}
+    rows = [row for row in rows if row["error"] <= MOST_SHOWN]
     for row in rows:
         color = "#0072b2" if row["method"] == "quotient" else "#444444"
         place = row["cycles"], row["error"]
@@ -82,11 +87,10 @@ def draw_front(path: Path, rows: Sequence[Mapping[str, Any]]) -> None:
         name = "quotient, phong" if row["model"] == "phong" else row["method"]
         if row["model"] != "cosquad":
             labels.setdefault(name, Label(*place, name, color))
-    axes.set(xscale="log", yscale="log", xlabel="cycles a pixel", ylabel="largest error, LSB")
+    axes.set(xscale="log", xlabel="cycles a pixel", ylabel="largest error, LSB", ylim=(0.47, MOST_SHOWN))
     axes.axhline(0.5, color="#999999", linewidth=0.8)
+    axes.margins(x=0.2)
     _ticks(axes.xaxis, 1, 2, 5, 10)
-    _ticks(axes.yaxis, 0.5, 1, 10, 100)
-    axes.margins(x=0.2, y=0.15)
     place_labels(axes, list(labels.values()), [(row["cycles"], row["error"]) for row in rows])
     _write(figure, path)
 
