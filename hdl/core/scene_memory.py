@@ -4,9 +4,9 @@ from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from contextvars import ContextVar
 
-from amaranth.hdl import Module, Shape, Value, ValueLike, unsigned
+from amaranth.hdl import Module, Mux, Shape, Value, ValueLike, unsigned
 from amaranth.lib import data, stream
-from amaranth.lib.memory import Memory
+from amaranth.lib.memory import Memory, ReadPort
 
 __all__ = ["Contents", "contents_from", "scene_memory", "word_write_shape", "write_words"]
 
@@ -55,8 +55,12 @@ def word_write_shape(depth: int, width: int) -> data.StructLayout:
     return data.StructLayout({"address": place, "data": data.ArrayLayout(8, -(-width // 8))})
 
 
-def write_words(m: Module, memory: Memory, write: stream.Interface, idle: ValueLike) -> Value:
+def write_words(
+    m: Module, memory: Memory, read: ReadPort, address: ValueLike, write: stream.Interface, idle: ValueLike
+) -> Value:
     """Write a memory from a stream of `word_write_shape`, while the unit does not read.
+
+    Reads and writes share one address. With two addresses a block RAM would need look-up tables beside it.
 
     Parameters
     ----------
@@ -64,21 +68,26 @@ def write_words(m: Module, memory: Memory, write: stream.Interface, idle: ValueL
         Module that gets the logic.
     memory : Memory
         The memory.
+    read : ReadPort
+        Its read port, which gets its address here.
+    address : ValueLike
+        Address that the unit reads.
     write : stream.Interface
         Words to write.
     idle : ValueLike
-        Whether the unit reads no word.
+        Whether the unit reads no word. The word of the read port then has no meaning.
 
     Returns
     -------
     Value
-        Whether a word is written. If no port reads in this cycle, a block RAM needs no logic beside it.
+        Whether a word is written. The port must not read in this cycle.
     """
     port = memory.write_port()
     width = Shape.cast(memory.shape).width
     m.d.comb += [
         write.ready.eq(idle),
-        port.addr.eq(write.payload.address),
+        read.addr.eq(Mux(idle, write.payload.address, address)),
+        port.addr.eq(read.addr),
         port.data.eq(Value.cast(write.payload.data)[:width]),
         port.en.eq(write.valid & idle),
     ]

@@ -74,12 +74,11 @@ class DrawCommandsUnit(wiring.Component):
         ends = valid & (command.kind == KINDS.index("end"))
         advance = skid_buffer(m, self.o, valid & (first_band | ~once), read.data)
         idle = ~walks & ~waits
-        written = write_words(m, memory, self.write, idle) if self.loads else None
-        m.d.comb += [
-            read.addr.eq(address),
-            read.en.eq(advance if written is None else advance & ~written),
-            self.i.ready.eq(idle),
-        ]
+        if self.loads:
+            m.d.comb += read.en.eq(advance & ~write_words(m, memory, read, address, self.write, idle))
+        else:
+            m.d.comb += [read.addr.eq(address), read.en.eq(advance)]
+        m.d.comb += self.i.ready.eq(idle)
         with m.If(self.i.valid & self.i.ready):
             m.d.sync += [address.eq(self.i.payload.start), first_band.eq(self.i.payload.first_band)]
             m.d.sync += walks.eq(1)

@@ -74,14 +74,12 @@ class MeshMemoryUnit(wiring.Component):
         payload = Signal(self.o.payload.shape(), name="vertex")
         advance = skid_buffer(m, self.o, valid, payload)
         words = Value.cast(payload)[given.index_bits :]
-        written = write_words(m, memory, self.write, left == 0) if self.loads else None
-        m.d.comb += [
-            payload.index.eq(index),
-            words.eq(read.data),
-            read.addr.eq(address),
-            read.en.eq(advance if written is None else advance & ~written),
-            self.i.ready.eq(left == 0),
-        ]
+        if self.loads:
+            written = write_words(m, memory, read, address, self.write, left == 0)
+            m.d.comb += read.en.eq(advance & ~written)
+        else:
+            m.d.comb += [read.addr.eq(address), read.en.eq(advance)]
+        m.d.comb += [payload.index.eq(index), words.eq(read.data), self.i.ready.eq(left == 0)]
         with m.If(advance):
             m.d.sync += [valid.eq(left != 0), index.eq(address)]
         with m.If(left == 0), m.If(self.i.valid):

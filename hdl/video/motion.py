@@ -85,24 +85,23 @@ class MotionUnit(wiring.Component):
         rows = model.words
         m.submodules.coefficients = memory = scene_memory("coefficients", model.WORD_BITS, len(rows), rows)
         read = memory.read_port()
-        if self.loads:
-            waits = Signal(name="waits")
-            m.d.comb += read.en.eq(~write_words(m, memory, self.write, waits))
         sines = model.table.codes.tolist()
         m.submodules.sines = table = Memory(shape=ENTRY.width - 1, depth=len(sines), init=sines)
         look = table.read_port()
 
         angle, index = Signal(ANGLE_BITS, name="angle"), Signal(range(ENTRIES), name="entry")
         address, step = Signal(range(len(rows)), name="address"), Signal(range(_STEPS), name="step")
+        if self.loads:
+            waits = Signal(name="waits")
+            m.d.comb += read.en.eq(~write_words(m, memory, read, address, self.write, waits))
+        else:
+            m.d.comb += read.addr.eq(address)
         cosine, sine = (Signal(signed(ENTRY.width), name=name) for name in ("cosine", "sine"))
         bits = model.TABLE_BITS
         code = Mux(step == 0, angle + (1 << bits), angle)[:ANGLE_BITS]
         negative = Signal(name="negative")
         looked = Mux(negative, -look.data, look.data)[: ENTRY.width].as_signed()
-        m.d.comb += [
-            look.addr.eq(code[:bits] ^ code[bits].replicate(bits)),
-            read.addr.eq(address),
-        ]
+        m.d.comb += look.addr.eq(code[:bits] ^ code[bits].replicate(bits))
         m.d.sync += negative.eq(code[-1])
 
         a, b = (Signal(signed(ENTRY.width), name=f"factor_{name}") for name in "ab")

@@ -117,10 +117,11 @@ class TriangleAssemblyUnit(wiring.Component):
         last = corner == 2
         rests, reads = (left == 0) & ~walks, advance & (~walks | last)
         if self.loads:
-            reads = reads & ~write_words(m, triangles, self.faces, rests)
+            reads = reads & ~write_words(m, triangles, face, following, self.faces, rests)
+        else:
+            m.d.comb += face.addr.eq(following)
         m.d.comb += [
             self.i.ready.eq(rests),
-            face.addr.eq(following),
             face.en.eq(reads),
             read.addr.eq(
                 Mux(

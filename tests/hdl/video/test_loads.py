@@ -2,6 +2,8 @@
 """Memories that are written: each unit then gives the words of the other memory."""
 
 import numpy as np
+from amaranth.hdl import Value
+from amaranth.sim import Simulator
 
 from blysk.bench.units.video.meshes import any_memory
 from blysk.golden.video.draw_commands import COMMAND_BITS, DrawCommands
@@ -29,6 +31,43 @@ def test_vertices():
     found = run(MeshMemoryUnit(old, True), {"first": np.array([0]), "count": np.array([9])}, write, 9)
     np.testing.assert_array_equal(found["position"], new.position)
     np.testing.assert_array_equal(found["normal"], new.normal)
+
+
+def test_writes_wait_while_a_range_is_read():
+    """Ranges and writes are offered all the time. One word is written before each range, and none inside."""
+    count = 5
+    old, new = any_memory(count, 5), any_memory(count, 5, seed=1)
+    unit, given = MeshMemoryUnit(old, True), writes(new.vertex_words, new.vertex_bits)
+    found, written = [], []
+
+    async def read(context):
+        context.set(unit.i.payload, {"first": 0, "count": count})
+        context.set(unit.i.valid, 1)
+        context.set(unit.o.ready, 1)
+        while len(found) < count * count:
+            *_, valid, vertex = await context.tick().sample(unit.o.valid, Value.cast(unit.o.payload))
+            if valid:
+                found.append(vertex >> old.index_bits)
+
+    async def write(context):
+        context.set(unit.write.valid, 1)
+        for address, data in zip(given["address"].tolist(), given["data"].tolist(), strict=True):
+            context.set(unit.write.payload, {"address": address, "data": data})
+            await context.tick().until(unit.write.ready)
+            written.append(len(found))
+        context.set(unit.write.valid, 0)
+
+    simulator = Simulator(unit)
+    simulator.add_clock(1e-6)
+    simulator.add_testbench(read)
+    simulator.add_testbench(write, background=True)
+    simulator.run()
+    ranges = [found[k : k + count] for k in range(0, len(found), count)]
+    expected = [
+        new.vertex_words[: number + 1] + old.vertex_words[number + 1 :] for number in range(len(ranges))
+    ]
+    assert ranges == expected
+    assert len(written) == count
 
 
 def test_commands():
