@@ -10,8 +10,10 @@ from blysk.golden.build import Build
 from blysk.golden.geometry.geometry import COUNTERS
 from blysk.golden.geometry.span_attributes import DEPTH_STEP, SPAN_DEPTH
 from blysk.golden.render import Renderer
+from blysk.golden.video.mesh_memory import BLOCK_WORDS
 from blysk.hdl.core.fixed import FixedShape
 from blysk.hdl.core.memory import UNCOUNTED, connect_late_fifo
+from blysk.hdl.core.serial_fifo import connect_serial_fifo
 from blysk.hdl.core.single_register import connect_register
 from blysk.hdl.core.stream import connect, moving
 from blysk.hdl.core.views import copy, copy_fields
@@ -26,7 +28,14 @@ from blysk.hdl.geometry.triangles import COUNTER_BITS, counters_shape, frame_sha
 from blysk.hdl.pipeline import ShadingPipelineUnit
 from blysk.hdl.port_descriptions import COUNTER_TEXTS, TEXTURE_TEXTS
 
-__all__ = ["PORT_DESCRIPTIONS", "STATUS", "WAITING_SPANS", "RendererUnit", "waiting_spans"]
+__all__ = [
+    "PORT_DESCRIPTIONS",
+    "STATUS",
+    "WAITING_SPANS",
+    "WAITING_WORDS",
+    "RendererUnit",
+    "waiting_spans",
+]
 
 STATUS = (*COUNTERS, "spans", "pixels", "hidden", "dropped", "out_of_range_spans")
 """Counters of `RendererUnit`."""
@@ -75,8 +84,16 @@ WAITING_SPANS = 512
 """Spans that may wait between geometry and shading, in a FIFO of block RAMs.
 
 While geometry sets up small triangles or cuts spans, shading works on the waiting spans. While shading works
-on long spans, geometry goes on. The compact style has this FIFO only if spans have vectors, or if there is a
-coarse test. In other compact designs one span waits in a register.
+on long spans, geometry goes on. The compact style has another FIFO if spans have vectors (`WAITING_WORDS`).
+In other compact designs this FIFO is there only with a coarse test. Without the test one span waits in a
+register.
+"""
+
+WAITING_WORDS = BLOCK_WORDS
+"""Words of a span's parts that may wait in the compact style, if spans have vectors: a single block RAM.
+
+Geometry then takes 13 cycles or more for a span. So parts of spans are written and read one a cycle. The
+block RAM holds 85 spans, or 42 with vertex colours. Whole spans would take 6 or 12 block RAMs.
 """
 
 _OF_LANES = 4
@@ -106,10 +123,11 @@ class RendererUnit(wiring.Component):
 
     `GeometryUnit` turns triangles into spans, `ShadingPipelineUnit` turns spans into pixels, and
     `DepthTesterUnit` drops hidden pixels. Spans wait for the pipeline in a FIFO or a register
-    (`waiting_spans`). The depths of the spans go beside the pipeline, in another FIFO. With a coarse depth
-    test a span also waits for the test's answer. Then the pipeline takes the span, or the unit drops it in
-    one cycle. The units work at the same time. If no unit waits for long, a frame takes as many cycles as the
-    slowest unit alone. The design's `Build` has the styles, the lanes of triangle setup and the coarse test.
+    (`waiting_spans`, `WAITING_WORDS`). The depths of the spans go beside the pipeline, in another FIFO. With
+    a coarse depth test a span also waits for the test's answer. Then the pipeline takes the span, or the unit
+    drops it in one cycle. The units work at the same time. If no unit waits for long, a frame takes as many
+    cycles as the slowest unit alone. The design's `Build` has the styles, the lanes of triangle setup and the
+    coarse test.
 
     Frame constants are written while no span is inside. If the material changes from a span to the next, the
     next span waits until the pipeline is empty, see `ShadingPipelineUnit`.
@@ -216,6 +234,8 @@ class RendererUnit(wiring.Component):
             # Geometry is slower than shading here, so spans hardly wait. The look-up tables of a FIFO would
             # cost as much as the register that it replaces.
             connect_register(m, "waiting_span", made, ready)
+        elif geometry.compact and geometry.vectors:
+            connect_serial_fifo(m, "spans", made, ready, WAITING_WORDS)
         else:
             connect_late_fifo(m, "spans", made, ready, room_for)
         given, dropped = Signal(name="given"), Signal(name="dropped")

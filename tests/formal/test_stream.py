@@ -10,6 +10,7 @@ from amaranth.lib.wiring import In, Out
 
 import blysk.hdl.core.memory
 import blysk.hdl.core.pipelined_unit
+import blysk.hdl.core.serial_fifo
 import blysk.hdl.core.stream
 from blysk.hdl.core.pipelined_unit import PipelinedUnit
 from blysk.hdl.core.stream import connect_slice
@@ -83,6 +84,12 @@ def kept(depth):
 def late(depth):
     return lambda m, number, source, sink: blysk.hdl.core.memory.connect_late_fifo(
         m, f"late_{number}", source, sink, depth
+    )
+
+
+def in_parts(words):
+    return lambda m, number, source, sink: blysk.hdl.core.serial_fifo.connect_serial_fifo(
+        m, f"parts_{number}", source, sink, words, 1
     )
 
 
@@ -230,6 +237,32 @@ def test_bugs_of_a_late_buffer_are_found(refute, inject, bug):
     """Each bug, injected in `connect_late_fifo`, refutes a claim of a stream."""
     inject(blysk.hdl.core.memory, "connect_late_fifo", *LATE_BUFFER_BUGS[bug])
     refute(of_late_buffer(), 14)
+
+
+def of_serial_buffer(words):
+    """Beats of two parts: as many in the memory as it has room for, and one behind it."""
+    return of_stream(Chain(in_parts(words)), words // 2 + 1, 6, 10)
+
+
+@pytest.mark.parametrize("words", [4, 8])
+def test_serial_buffer(prove, words):
+    """By induction: the claims of a stream, with six cycles of latency."""
+    prove(of_serial_buffer(words))
+
+
+SERIAL_BUFFER_BUGS = {
+    "what waits is written over": ("level < room - 1", "level < room"),
+    "a beat is read before its last part is written": ("turn == parts - 1", "turn == 0"),
+    "a beat is given without its last part": ("ends = step == parts", "ends = step == parts - 1"),
+    "a beat is given before it is there": ("~there & level.any()", "~there"),
+}
+
+
+@pytest.mark.parametrize("bug", SERIAL_BUFFER_BUGS)
+def test_bugs_of_a_serial_buffer_are_found(refute, inject, bug):
+    """Each bug, injected in `connect_serial_fifo`, refutes a claim of a stream."""
+    inject(blysk.hdl.core.serial_fifo, "connect_serial_fifo", *SERIAL_BUFFER_BUGS[bug])
+    refute(of_serial_buffer(4))
 
 
 def test_a_proof_of_too_few_cycles_is_found(prove):

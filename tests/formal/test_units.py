@@ -75,11 +75,12 @@ COUNTED = [
 
 @pytest.fixture(autouse=True)
 def short_fifos(monkeypatch):
-    """Memories of geometry hold 5 or 8 words in place of 512, because each of their bits is a register of the
-    proof."""
+    """Memories of geometry hold 5, 8 or 32 words in place of 512, because each of their bits is a register of
+    the proof."""
     monkeypatch.setattr("blysk.hdl.geometry.vertex_sort.WAITING_TRIANGLES", 8)
     monkeypatch.setattr("blysk.hdl.geometry.geometry.BLOCK_WORDS", 5)
     monkeypatch.setattr("blysk.hdl.render.WAITING_SPANS", 5)
+    monkeypatch.setattr("blysk.hdl.render.WAITING_WORDS", 32)
 
 
 def of_waiting(unit):
