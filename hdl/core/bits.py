@@ -1,10 +1,10 @@
-"""Count of a word's leading zeros, and choice of a word by an index."""
+"""Count of a word's leading zeros, choice of a word by an index, product with a constant."""
 
 from collections.abc import Sequence
 
-from amaranth.hdl import Mux, Value
+from amaranth.hdl import Const, Mux, Value
 
-__all__ = ["leading_zeros", "select"]
+__all__ = ["leading_zeros", "select", "times_constant"]
 
 
 def leading_zeros(code: Value) -> Value:
@@ -39,3 +39,12 @@ def select(words: Sequence[Value], index: Value) -> Value:
     half = 1 << (len(words) - 1).bit_length() - 1
     bit = half.bit_length() - 1
     return Mux(index[bit], select(words[half:], index[:bit]), select(words[:half], index[:bit]))
+
+
+def times_constant(value: Value, factor: int) -> Value:
+    """Product of an unsigned value of a few bits and a constant, chosen from all products.
+
+    A product by ``*`` takes a multiplier of an FPGA, even for a constant.
+    """
+    width = max((((1 << len(value)) - 1) * factor).bit_length(), 1)
+    return select([Const(number * factor, width) for number in range(1 << len(value))], value)

@@ -7,6 +7,7 @@ from amaranth.lib.memory import Memory
 from amaranth.lib.wiring import In, Out
 
 from blysk.golden.video.band_buffer import BandBuffer
+from blysk.hdl.core.bits import times_constant
 from blysk.hdl.core.views import copy_fields
 from blysk.hdl.geometry.depth_tester import is_inside
 from blysk.hdl.geometry.triangles import count_events, counters_shape
@@ -153,7 +154,7 @@ class BandBufferUnit(wiring.Component):
                     self.request.valid.eq(~asked),
                     self.pixels.ready.eq(1),
                     self.done.ready.eq(1),
-                    place.eq(_times(pixel.y, model.mode.horizontal.visible) + pixel.x),
+                    place.eq(times_constant(pixel.y, model.mode.horizontal.visible) + pixel.x),
                     write.en.eq(self.pixels.valid & is_inside(pixel, size)),
                     write.data.eq(word ^ self._clear),
                 ]
@@ -218,8 +219,3 @@ class BandBufferUnit(wiring.Component):
         for channel, bits in zip("rgb", model.colour_bits, strict=True):
             code, word = word[:bits], word[bits:]
             m.d.comb += self.shown[channel].eq(Cat(code[2 * bits - 8 :], code) if bits < 8 else code)
-
-
-def _times(value: Value, factor: int) -> Value:
-    """A product with a constant, as a sum. A value of four bits needs no multiplier."""
-    return sum(value << k for k in range(factor.bit_length()) if factor >> k & 1)

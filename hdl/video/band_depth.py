@@ -8,6 +8,7 @@ from amaranth.lib.wiring import In, Out
 from blysk.golden.geometry.depth_tester import DepthTester
 from blysk.golden.geometry.triangles import DEPTH
 from blysk.golden.video.band_depth import BandDepth
+from blysk.hdl.core.bits import times_constant
 from blysk.hdl.geometry.depth_tester import DepthMemory, is_inside
 
 __all__ = ["BandDepthUnit"]
@@ -60,7 +61,7 @@ class BandDepthUnit(wiring.Component):
             m.d.sync += [left.eq(left - 1), place.eq(Mux(place == model.words - 1, 0, place + 1))]
 
         def address(place) -> Value:
-            return (place.y * model.size[0] + place.x)[: len(read.addr)]
+            return (times_constant(place.y, model.size[0]) + place.x)[: len(read.addr)]
 
         outside = Signal(name="read_outside")
         with m.If(port.read_enable):

@@ -9,6 +9,7 @@ from amaranth.lib.wiring import In, Out
 
 from blysk.golden.video.motion import ANGLE_BITS, ENTRIES, Motion
 from blysk.golden.video.vertex_unit import ENTRY, OFFSET
+from blysk.hdl.core.bits import times_constant
 from blysk.hdl.core.fixed import FixedShape, FixedValue
 from blysk.hdl.core.scene_memory import scene_memory, word_write_shape, write_words
 
@@ -119,7 +120,7 @@ class MotionUnit(wiring.Component):
                     m.d.comb += waits.eq(1)
                 m.d.sync += [step.eq(0), index.eq(0), angle.eq(self.i.payload.angle)]
                 with m.If(self.i.valid):
-                    m.d.sync += address.eq(self.i.payload.slot * ENTRIES)
+                    m.d.sync += address.eq(times_constant(self.i.payload.slot, ENTRIES))
                     m.next = "turn"
             with m.State("turn"):
                 m.d.sync += step.eq(step + 1)
