@@ -6,7 +6,7 @@ from amaranth.lib.wiring import In, Out
 
 from blysk.golden.video.mesh_memory import MeshMemory
 from blysk.hdl.core.scene_memory import scene_memory, word_write_shape, write_words
-from blysk.hdl.core.stream import skid_buffer
+from blysk.hdl.core.single_register import hold_output
 from blysk.hdl.video.vertex_unit import mesh_vertex_shape
 
 __all__ = ["RANGE_BITS", "MeshMemoryUnit", "range_shape"]
@@ -23,8 +23,8 @@ def range_shape() -> data.StructLayout:
 class MeshMemoryUnit(wiring.Component):
     """Reads ranges of vertices, a vertex a cycle, from a memory that holds a mesh after power-up.
 
-    A range is accepted while no other range is read. Its first vertex is offered two cycles later. The unit
-    has no multipliers.
+    A range is accepted while no other range is read. Its first vertex is offered two cycles later. The read
+    depends on the output's ready of the same cycle. The unit has no multipliers.
 
     Parameters
     ----------
@@ -72,7 +72,9 @@ class MeshMemoryUnit(wiring.Component):
         )
         valid, index = Signal(name="valid"), Signal(given.index_bits, name="index")
         payload = Signal(self.o.payload.shape(), name="vertex")
-        advance = skid_buffer(m, self.o, valid, payload)
+        # The memory keeps its word. A skid buffer would cost a multiplexer for each bit of a vertex without a
+        # gain, because the vertex unit takes many cycles for a vertex.
+        advance = hold_output(m, self.o, valid, payload)
         words = Value.cast(payload)[given.index_bits :]
         if self.loads:
             written = write_words(m, memory, read, address, self.write, left == 0)

@@ -97,8 +97,8 @@ class TriangleAssemblyUnit(wiring.Component):
         result, valid = Signal(self.o.payload.shape(), name="result"), Signal(name="valid")
         advance = Signal(name="advance")
         m.d.comb += [
-            # Reads and writes share one address. With two addresses a block RAM would need registers beside
-            # it.
+            # Reads and writes share one address, and never come in the same cycle. If not, a block RAM would
+            # need registers beside it, or give words of half its width.
             write.addr.eq(read.addr),
             write.data.eq(Value.cast(self.write.payload.vertex)),
             write.en.eq(self.write.valid),
@@ -130,7 +130,7 @@ class TriangleAssemblyUnit(wiring.Component):
                     Array(face.data.word_select(k, mesh.index_bits) for k in range(3))[corner],
                 )
             ),
-            read.en.eq(advance),
+            read.en.eq(advance & ~self.write.valid),
         ]
         with m.If(self.i.ready), m.If(self.i.valid):
             given = self.i.payload
