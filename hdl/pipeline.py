@@ -13,8 +13,15 @@ from blysk.hdl.albedo.albedo import AlbedoUnit
 from blysk.hdl.albedo.attribute_spans import span_attributes_shape
 from blysk.hdl.albedo.texel_memory import texels_shape
 from blysk.hdl.albedo.texture_address import texel_request_shape
-from blysk.hdl.core.memory import LATE_FIFO_LATENCY, UNCOUNTED, connect_late_fifo, connect_wide_fifo
+from blysk.hdl.core.memory import (
+    LATE_FIFO_LATENCY,
+    LUT_WORDS,
+    UNCOUNTED,
+    connect_late_fifo,
+    connect_wide_fifo,
+)
 from blysk.hdl.core.shapes import normal_shape
+from blysk.hdl.core.single_register import connect_register
 from blysk.hdl.core.stream import FIFO_LATENCY, SLICE_LATENCY, connect, connect_fifo
 from blysk.hdl.core.views import copy, copy_fields
 from blysk.hdl.frame_constants import FrameConstantsUnit, existing_material, write_shape
@@ -23,7 +30,10 @@ from blysk.hdl.pixel_assembler import PixelAssemblerUnit, coordinates_shape
 from blysk.hdl.pixel_shading import COMPACT_INTERVAL, PixelShading, connect_lanes, each_lane
 from blysk.hdl.port_descriptions import SPAN_COUNTER_BITS
 
-__all__ = ["ShadingPipelineUnit", "span_shape", "status_shape"]
+__all__ = ["SPACED", "ShadingPipelineUnit", "span_shape", "status_shape"]
+
+SPACED = 8
+"""Spacing of spans from which `ShadingPipelineUnit` has fewer words that wait."""
 
 
 def span_shape(model: ShadingPipeline) -> data.StructLayout:
@@ -142,6 +152,9 @@ class ShadingPipelineUnit(wiring.Component):
     ----------
     model : ShadingPipeline
         Method, reflection model, numbers of lights and materials, and build options.
+    spacing : int
+        Least number of cycles from a span to the next. From `SPACED` on, fewer words wait beside the
+        interpolator. If spans come sooner, they wait.
 
     Raises
     ------
@@ -170,8 +183,9 @@ class ShadingPipelineUnit(wiring.Component):
     Source: docs/theory/units.md#pipeline; [T] figure 4.10.
     """
 
-    def __init__(self, model: ShadingPipeline | None = None):
+    def __init__(self, model: ShadingPipeline | None = None, spacing: int = 1):
         self.model = p = model or ShadingPipeline()
+        self._spacing = spacing
         self._assembler = PixelAssemblerUnit(p.x_bits, p.y_bits, p.length_bits, p.build.lanes)
         members = {
             "i": In(stream.Signature(span_shape(p))),
@@ -205,9 +219,10 @@ class ShadingPipelineUnit(wiring.Component):
         self._albedo = AlbedoUnit(p.albedo, p.length_bits, interval)
         behind = shading.latency - shading.light_latency + self._assembler.latency
         before = self.latency - behind if p.lights else 0
-        # Room for all pixels whose albedo may come before their terms.
-        self._waiting_albedos = -(-before // interval) + UNCOUNTED + 2
         path = SLICE_LATENCY + self._albedo.latency + LATE_FIFO_LATENCY
+        # Room for all pixels whose albedo comes before their terms.
+        ahead = max(before - path, 0) + LATE_FIFO_LATENCY
+        self._waiting_albedos = -(-ahead // interval) + UNCOUNTED + 2
         self.latency = max(before, path) + behind
         self.cycles_per_pixel = max(self.cycles_per_pixel, shading.cycles_per_pixel, interval)
 
@@ -248,7 +263,8 @@ class ShadingPipelineUnit(wiring.Component):
     @property
     def _waiting_spans(self) -> int:
         """Depth of the FIFOs beside interpolator and lights: the most spans that these may contain."""
-        return max(-(-self.latency // self._shortest_interval) + UNCOUNTED, 17)
+        inside = -(-self.latency // max(self._shortest_interval, self._spacing)) + UNCOUNTED
+        return max(inside, 17 if self._spacing < SPACED else LUT_WORDS)
 
     @property
     def spans_inside(self) -> int:
@@ -307,7 +323,10 @@ class ShadingPipelineUnit(wiring.Component):
             *copy_fields(source.payload, attributes, attributes.shape().members),
             source.payload.length.eq(self.i.payload.length),
         ]
-        connect_wide_fifo(m, "waiting_attributes", source, unit.i, depth=4)
+        if self._spacing < SPACED:
+            connect_wide_fifo(m, "waiting_attributes", source, unit.i, depth=4)
+        else:
+            connect_register(m, "waiting_attributes", source, unit.i)
         albedo = unit.o.signature.create(path=("colored",))
         connect_late_fifo(m, "albedos", unit.o, albedo, self._waiting_albedos)
         if unit.model.texture is not None:

@@ -12,7 +12,7 @@ from blysk.golden.geometry.span_attributes import DEPTH_STEP, SPAN_DEPTH
 from blysk.golden.render import Renderer
 from blysk.golden.video.mesh_memory import BLOCK_WORDS
 from blysk.hdl.core.fixed import FixedShape
-from blysk.hdl.core.memory import UNCOUNTED, connect_late_fifo
+from blysk.hdl.core.memory import LUT_WORDS, UNCOUNTED, connect_late_fifo
 from blysk.hdl.core.serial_fifo import connect_serial_fifo
 from blysk.hdl.core.single_register import connect_register
 from blysk.hdl.core.stream import connect, moving
@@ -25,7 +25,7 @@ from blysk.hdl.geometry.light_adapter import LightAdapterUnit, with_components
 from blysk.hdl.geometry.mirror_adapter import MirrorAdapterUnit
 from blysk.hdl.geometry.span_adapter import connect_shading_span
 from blysk.hdl.geometry.triangles import COUNTER_BITS, counters_shape, frame_shape, triangle_shape
-from blysk.hdl.pipeline import ShadingPipelineUnit
+from blysk.hdl.pipeline import SPACED, ShadingPipelineUnit
 from blysk.hdl.port_descriptions import COUNTER_TEXTS, TEXTURE_TEXTS
 
 __all__ = [
@@ -183,7 +183,9 @@ class RendererUnit(wiring.Component):
         self.model = model or Renderer()
         design, geometry = self.model.design, self.model.geometry
         self.geometry = GeometryUnit(geometry, design.build)
-        self.pipeline = ShadingPipelineUnit(design)
+        self._serial = self.geometry.compact and self.geometry.vectors
+        # A span has six parts or more in the FIFO, so spans leave it eight cycles apart or more.
+        self.pipeline = ShadingPipelineUnit(design, SPACED if self._serial else 1)
         self._adapters()
         coarse, bits = self.model.coarse, (design.x_bits, design.y_bits)
         self.coarse = None if coarse is None else CoarseDepthUnit(coarse, *bits)
@@ -234,7 +236,7 @@ class RendererUnit(wiring.Component):
             # Geometry is slower than shading here, so spans hardly wait. The look-up tables of a FIFO would
             # cost as much as the register that it replaces.
             connect_register(m, "waiting_span", made, ready)
-        elif geometry.compact and geometry.vectors:
+        elif self._serial:
             connect_serial_fifo(m, "spans", made, ready, WAITING_WORDS)
         else:
             connect_late_fifo(m, "spans", made, ready, room_for)
@@ -250,8 +252,9 @@ class RendererUnit(wiring.Component):
         ]
         waits = stream.Signature(data.StructLayout(_DEEP))
         entering, waiting = waits.create(path=("entering",)), waits.create(path=("waiting",))
-        # There is room whenever the pipeline takes a span.
-        connect_late_fifo(m, "depths", entering, waiting, pipeline.spans_inside + 1 + UNCOUNTED)
+        # There is room whenever the pipeline takes a span. Spans that are apart take fewer words.
+        words = LUT_WORDS if self._serial else pipeline.spans_inside + 1 + UNCOUNTED
+        connect_late_fifo(m, "depths", entering, waiting, words)
         pixel = pipeline.o
         if compact := self.model.design.build.compact:
             pixel = stream.Signature(pipeline.o.payload.shape()).create(path=("pixel",))

@@ -18,6 +18,7 @@ from blysk.hdl.core.views import of_shape, require_same_shape
 __all__ = [
     "HEADED_FIFO_LATENCY",
     "LATE_FIFO_LATENCY",
+    "LUT_WORDS",
     "NEEDS_ZEROS",
     "UNCOUNTED",
     "clocked_reads",
@@ -41,6 +42,9 @@ HEADED_FIFO_LATENCY = 2
 
 LATE_FIFO_LATENCY = 4
 """Cycles that a payload takes through the empty FIFO of `connect_late_fifo`."""
+
+LUT_WORDS = 16
+"""Words of a memory in the look-up tables of an FPGA. More words take several memories, and multiplexers."""
 
 UNCOUNTED = 3
 """Largest number of payloads inside `connect_late_fifo` that its level does not count yet."""

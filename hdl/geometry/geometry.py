@@ -12,7 +12,7 @@ from blysk.golden.geometry.plane_assembler import PlaneAssembler
 from blysk.golden.geometry.span_halver import SpanHalver
 from blysk.golden.geometry.triangles import ATTRIBUTES
 from blysk.golden.geometry.vector_adapter import VectorAdapter
-from blysk.hdl.core.memory import UNCOUNTED, connect_late_fifo
+from blysk.hdl.core.memory import LUT_WORDS, UNCOUNTED, connect_late_fifo
 from blysk.hdl.core.single_register import connect_register, hold_output
 from blysk.hdl.core.stream import connect, moving
 from blysk.hdl.core.views import copy, copy_fields
@@ -136,9 +136,11 @@ class _TriangleSetup(wiring.Component):
 
         ahead = (edges.latency + planes.latency) // self.interval + 3
         attributes, scales = _between("attribute", serialiser.o), _between("scale", planes.o)
-        depth = self._count * ahead
-        if not self._compact:
-            depth = max(depth + UNCOUNTED, BLOCK_WORDS)
+        if self._compact:
+            # The first attributes of a triangle have left before those of the next but one come.
+            depth = max(self._count * (ahead - 1), LUT_WORDS)
+        else:
+            depth = max(self._count * ahead + UNCOUNTED, BLOCK_WORDS)
         connect_late_fifo(m, "waiting_attributes", serialiser.o, attributes, depth)
         # While the gradients of a triangle are computed, the plane setup goes on with the next triangle.
         connect_register(m, "waiting_scale", planes.o, scales)
