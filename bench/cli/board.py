@@ -9,7 +9,7 @@ from typing import Any
 import click
 from click.core import ParameterSource
 
-from blysk.bench.tools.board_options import COLOURS, DEFAULTS, LOADERS, OPTIONS
+from blysk.bench.tools.board_options import COLOURS, DEFAULT_COLOURS, DEFAULTS, LOADERS, OPTIONS
 from blysk.bench.tools.boards import board_named, packages_missing
 from blysk.sim.api.options import DESIGN, SCENE
 from blysk.sim.api.settings import check_mesh, read_settings
@@ -40,7 +40,9 @@ _MOST_FRAMES = 60
 @click.option(
     "--colours",
     type=Choice("colours", COLOURS),
-    help="Bits of a pixel in the band buffer.  [default: rgb888 for ulx3s-85f, rgb565 for the others]",
+    default=DEFAULT_COLOURS,
+    show_default=True,
+    help="Bits of a pixel in the band buffer. rgb565 leaves block RAMs for a larger mesh.",
 )
 @click.option(
     "--clock",
@@ -71,6 +73,11 @@ _MOST_FRAMES = 60
     help="Add a loader, which takes other meshes of blysk send: from the serial port, from the flash after "
     "power-up, or both.  [default: none]",
 )
+@click.option(
+    "--vertex-colours",
+    is_flag=True,
+    help="Draw vertex colours on a board with a 25F, too. So far no placement of them was found.",
+)
 @click.option("--record", type=OutputFile(), help="JSON file to which the figures of this run are added.")
 @click.option("--load", is_flag=True, help="Load the bitstream with openFPGALoader.")
 @options_of(OPTIONS)
@@ -87,6 +94,7 @@ def command(
     seeds,
     routed,
     loader,
+    vertex_colours,
     record,
     load,
     **_,
@@ -104,7 +112,8 @@ def command(
     With --from nothing is placed, and the command takes seconds. It refuses what would change more than the
     words of memories.
 
-    Vertex colours and textures are drawn if the board has room for them. If not, a warning says why.
+    On an 85F vertex colours and textures are drawn if there is room for them. A warning says what is left
+    out, and why.
 
     The buttons of the board stop the motion, reverse it, and change the material and the light.
 
@@ -138,7 +147,7 @@ def command(
     from blysk.bench.tools.board_from import RoutedBitstream
 
     source = None if routed is None else RoutedBitstream.read(routed)
-    gpu, scenes, plan = work.planned(board, mesh, given, colours, clock, source, loader)
+    gpu, scenes, plan = work.planned(board, mesh, given, colours, clock, source, loader, None, vertex_colours)
     click.echo("\n".join(work.design_lines(board, mesh, gpu, plan)))
     if source is not None and not simulate:
         work.write_rewritten(work.rewritten_from(source, board, gpu, plan), output)

@@ -2,7 +2,7 @@
 
 import click
 
-from blysk.bench.tools.board_options import COLOURS, DEFAULTS, LOADERS, OPTIONS
+from blysk.bench.tools.board_options import COLOURS, DEFAULT_COLOURS, DEFAULTS, LOADERS, OPTIONS
 from blysk.bench.tools.boards import BOARDS, board_named
 from blysk.sim.api.options import DESIGN, SCENE
 from blysk.sim.api.settings import check_mesh, read_settings
@@ -32,13 +32,20 @@ __all__ = ["command"]
     show_default=True,
     help="As the bitstream was made.",
 )
-@click.option("--colours", type=Choice("colours", COLOURS), help="As the bitstream was made.")
+@click.option(
+    "--colours",
+    type=Choice("colours", COLOURS),
+    default=DEFAULT_COLOURS,
+    show_default=True,
+    help="As the bitstream was made.",
+)
+@click.option("--vertex-colours", is_flag=True, help="As the bitstream was made.")
 @click.option(
     "--clock", type=Number(1, 126, "MHz"), default=52.5, show_default=True, help="As the bitstream was made."
 )
 @options_of(OPTIONS)
 @click.pass_context
-def command(context, mesh, board_name, made_for, port, output, loader, colours, clock, **_):
+def command(context, mesh, board_name, made_for, port, output, loader, colours, vertex_colours, clock, **_):
     """Send MESH (a mesh file, a scene file, or teapot) to a board that runs.
 
     The bitstream on the board has a loader (blysk board --loader). Name the mesh for which it was made by
@@ -72,7 +79,7 @@ def command(context, mesh, board_name, made_for, port, output, loader, colours, 
         serial_library()
     else:
         check_outputs([], pictures=[], others=[output])
-    gpu, *_ = work.planned(board, mesh, given, colours, clock, None, loader, made_for)
+    gpu, *_ = work.planned(board, mesh, given, colours, clock, None, loader, made_for, vertex_colours)
     data = sent_by(gpu)
     words = ", ".join(f"{len(of.words):,} {of.name}" for of in gpu.drawing.memories)
     click.echo(f"{'words':<12}{words}")

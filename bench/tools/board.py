@@ -67,17 +67,18 @@ def planned(
     board: Board,
     mesh: str,
     given: Mapping[str, Any],
-    colours: str | None,
+    colours: str,
     clock: float,
     source: RoutedBitstream | None = None,
     loader: str | None = None,
     made_for: str | None = None,
+    vertex_colours: bool = False,
 ) -> tuple[Gpu, list[Scene], ClockPlan]:
     """The drawing of a mesh on a board, the scenes of its presets, and its clocks.
 
     Parameters
     ----------
-    board, mesh, given, colours
+    board, mesh, given, colours, vertex_colours
         As in `gpu_of`.
     clock : float
         Rate of the drawing clock, MHz.
@@ -95,13 +96,19 @@ def planned(
         As in `gpu_of` and `loader_of`. If no PLL gives the clocks, or a frame takes longer than the display
         leaves. If the drawing does not fit the memories, or the bitstream is of another design.
     """
-    gpu, scenes = gpu_of(board, mesh, given, colours)
+    lines, first = None, None
+    if source is not None:
+        lines = min(source.lines or board.lines, board.lines)
+    if made_for is not None:
+        first = gpu_of(board, made_for, given, colours, None, vertex_colours)[0]
+        lines = first.buffer.lines
+    gpu, scenes = gpu_of(board, mesh, given, colours, lines, vertex_colours)
     try:
         plan = clock_plan(board.reference, gpu.buffer.mode.pixel_rate, 1e6 * clock)
     except NoClockPlan as error:
         raise InputError(f"--clock {clock:g}", str(error), "give another rate") from error
     _check_load(gpu, plan)
-    first = gpu if made_for is None else gpu_of(board, made_for, given, colours)[0]
+    first = first or gpu
     room = first.drawing.room
     if source is not None:
         loaded = gpu if loader is None else loader_of(gpu, plan, loader, mesh, gpu, room)

@@ -11,7 +11,7 @@ from amaranth.lib.wiring import Component
 from scipy.spatial.transform import Rotation
 
 from blysk.bench.tools.board_loader import connect_loader
-from blysk.bench.tools.board_options import COLOURS, DEFAULTS
+from blysk.bench.tools.board_options import COLOURS, DEFAULT_COLOURS, DEFAULTS
 from blysk.bench.tools.boards import Board
 from blysk.golden.albedo.texel_memory import BANKS
 from blysk.golden.frames.frame import background_code
@@ -55,12 +55,12 @@ MAX_LIGHTS = 4
 _SHINIER = 4
 """Exponent of the second material, as a multiple of the exponent of the first material."""
 
-_RENDERER_BLOCKS = {"compact": 19, "throughput": 46}
+_RENDERER_BLOCKS = {"compact": 14, "throughput": 46}
 """Block RAMs of the renderer's tables and buffers, command lists and motion, by the style of geometry."""
 
 _SURFACE_BLOCKS = {
-    "compact": {(True, False): 9, (False, True): 9, (True, True): 13},
-    "throughput": {(True, False): 17, (False, True): 16, (True, True): 26},
+    "compact": {(True, False): 1},
+    "throughput": {(True, False): 15, (False, True): 14, (True, True): 24},
 }
 """Further block RAMs with vertex colours and textures, by the style, without texels and mesh.
 
@@ -75,7 +75,12 @@ _TRANSFER_BLOCKS = 2
 
 
 def gpu_of(
-    board: Board, mesh: str, given: Mapping[str, Any], colours: str | None = None
+    board: Board,
+    mesh: str,
+    given: Mapping[str, Any],
+    colours: str = DEFAULT_COLOURS,
+    lines: int | None = None,
+    vertex_colours: bool = False,
 ) -> tuple[Gpu, list[Scene]]:
     """The drawing of a mesh on a board, and the scenes of its presets.
 
@@ -83,8 +88,9 @@ def gpu_of(
     and the same material with four times the exponent. The lights are the given lights, or the given lights
     turned by a quarter around the up direction.
 
-    Vertex colours and textures are drawn if the board has room for them. A larger image is halved until it
-    fits. A warning names everything that is left out.
+    Vertex colours and textures are drawn if the board has room for them. A small device draws no textures,
+    and vertex colours only if they are wanted. If a mesh with colours does not fit it, its bands have half as
+    many lines. A larger image is halved until it fits. A warning names everything that is left out.
 
     Parameters
     ----------
@@ -94,15 +100,18 @@ def gpu_of(
         File, scene file, or ``teapot``.
     given : dict
         Options of `OPTIONS`.
-    colours : str, optional
-        A key of `COLOURS`. The default is ``rgb888``, and ``rgb565`` on a small device.
+    colours : str
+        A key of `COLOURS`.
+    lines : int, optional
+        Lines of a band. By default as many as fit.
+    vertex_colours : bool
+        Whether a small device draws vertex colours. So far no placement of them was found there.
 
     Raises
     ------
     InputError
         If the mesh cannot be read, or does not fit, or an option is not accepted.
     """
-    colours = colours or ("rgb565" if board.compact else "rgb888")
     settings = read_settings(mesh, given, {**SCENE, **DESIGN}, **DEFAULTS)
     with settings.located():
         if settings["size"] != VGA.size:
@@ -110,16 +119,16 @@ def gpu_of(
         loaded = load(settings, lights=MAX_LIGHTS, local=False, cutoffs=False)
         bits = COLOURS[colours]
         try:
-            scene, design, less = _fitted(board, settings, loaded, bits)
+            scene, design, lines, less = _fitted(board, settings, loaded, bits, lines, vertex_colours)
         except _NoRoom as error:
-            loaded, less = without_albedo(loaded, str(error)), ""
+            loaded, lines, less = without_albedo(loaded, str(error)), lines or board.lines, ""
             (scene,) = scenes_of(loaded, settings)
             design = _design(settings, scene, board)
         warn_of_ignored(replace(loaded, ignored=(*loaded.ignored, *([less] if less else []))))
     scenes = _presets(scene, settings["up"])
     red, green, blue = background_code(scene, design.transfer).tolist()
-    buffer = BandBuffer(VGA, board.lines, colour_bits=bits, background=(red, green, blue))
-    _check_memory(board, mesh, scene, design, bits)
+    buffer = BandBuffer(VGA, lines, colour_bits=bits, background=(red, green, blue))
+    _check_memory(board, mesh, scene, design, bits, lines)
     try:
         drawing = Drawing.of(
             scenes, design, lines=buffer.lines, axis=settings["up"], controls=Controls(materials=2, lights=2)
@@ -171,9 +180,17 @@ class _NoRoom(Exception):
 
 
 def _fitted(
-    board: Board, settings: Settings, loaded: LoadedMesh, bits: tuple[int, int, int]
-) -> tuple[Scene, ShadingPipeline, str]:
-    """Scene and design of a mesh with its vertex colours and textures, and a text about smaller images.
+    board: Board,
+    settings: Settings,
+    loaded: LoadedMesh,
+    bits: tuple[int, int, int],
+    lines: int | None,
+    vertex_colours: bool,
+) -> tuple[Scene, ShadingPipeline, int, str]:
+    """Scene, design and lines of a band for a mesh with its vertex colours and textures.
+
+    A text about smaller images comes last. If ``lines`` are given, a band has as many. ``vertex_colours`` are
+    those of a small device.
 
     Raises
     ------
@@ -183,7 +200,14 @@ def _fitted(
     (scene,) = scenes_of(loaded, settings)
     design = _design(settings, scene, board)
     if not scene.has_albedo:
-        return scene, design, ""
+        return scene, design, lines or board.lines, ""
+    if scene.textures and board.compact:
+        raise _NoRoom(f"the {board.name} has too few multipliers for textures; use ulx3s-85f")
+    if board.compact and not vertex_colours:
+        raise _NoRoom(f"no placement of them was found on the {board.name} so far; try --vertex-colours")
+    # Bands of fewer lines take more cycles, because every band reads all triangles.
+    least = board.lines // 2 if board.compact else board.lines
+    choices = [lines] if lines else sorted({board.lines, least}, reverse=True)
     largest = max((max(of.size) for of in scene.textures.values()), default=1)
     for level in range(max(largest.bit_length() - _LEAST_SIDE.bit_length(), 0) + 1):
         shown = one_level(scene, level)
@@ -193,18 +217,20 @@ def _fitted(
             memory = MeshMemory.of([shown.mesh], surface, shown.textures)
         except ValueError as error:
             raise _NoRoom(str(error).partition("; ")[0]) from None
-        free, screen = _free_blocks(board, made, bits), screen_bits(GRID, surface)
-        if memory.blocks(screen) <= free:
-            less = f"details of images ({largest >> level} of {largest} texels a side fit the {board.name})"
-            return shown, made, less if level else ""
+        screen = screen_bits(GRID, surface)
+        for chosen in choices:
+            free = _free_blocks(board, made, bits, chosen)
+            if memory.blocks(screen) <= free:
+                shrunk = f"{largest >> level} of {largest} texels a side fit the {board.name}"
+                return shown, made, chosen, f"details of images ({shrunk})" if level else ""
     if most := MeshMemory.triangles_that_fit(free, screen, surface=surface):
         raise _NoRoom(f"with them the {board.name} has block RAMs for about {most:,} triangles")
     raise _NoRoom(f"the {board.name} has too few block RAMs for them; use ulx3s-85f")
 
 
-def _free_blocks(board: Board, design: ShadingPipeline, bits: tuple[int, int, int]) -> int:
+def _free_blocks(board: Board, design: ShadingPipeline, bits: tuple[int, int, int], lines: int) -> int:
     """Block RAMs that bands, renderer, further tables and texels leave free for the mesh."""
-    pixels = VGA.size[0] * board.lines
+    pixels = VGA.size[0] * lines
     style = "compact" if design.build.compact_geometry else "throughput"
     taken = block_rams(2 * pixels, sum(bits)) + block_rams(pixels, 27) + _RENDERER_BLOCKS[style]
     taken += 0 if design.transfer == "linear" else _TRANSFER_BLOCKS
@@ -217,12 +243,12 @@ def _free_blocks(board: Board, design: ShadingPipeline, bits: tuple[int, int, in
 
 
 def _check_memory(
-    board: Board, name: str, scene: Scene, design: ShadingPipeline, bits: tuple[int, int, int]
+    board: Board, name: str, scene: Scene, design: ShadingPipeline, bits: tuple[int, int, int], lines: int
 ) -> None:
     """Refuse a mesh that does not fit into the block RAMs that are left for it."""
     if design.albedo is not None:
         return
-    left, screen = _free_blocks(board, design, bits), screen_bits()
+    left, screen = _free_blocks(board, design, bits, lines), screen_bits()
     mesh, most = scene.mesh, MeshMemory.LARGEST - 1
     fits = len(mesh.faces) <= most and len(mesh.vertices) <= most
     if not fits or MeshMemory.of([mesh]).blocks(screen) > left:

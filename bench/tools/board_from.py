@@ -1,6 +1,7 @@
 """A bitstream with another scene in its memories, made from a routed bitstream without place and route."""
 
 import contextlib
+import re
 import tempfile
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
@@ -17,6 +18,7 @@ __all__ = ["Rewritten", "RoutedBitstream", "changed_lines", "rewrite"]
 _REMEDIES = {
     "materials": "give --materials one, or build without --from",
     "board": "name the board of the bitstream, or build without --from",
+    "surface": "give a mesh with vertex colours or textures like the first, or build without --from",
 }
 """Remedies for facts that differ."""
 
@@ -91,6 +93,12 @@ class RoutedBitstream:
         if not memories.blocks.keys() <= memory_words(configuration).keys():
             raise InputError(f"--from {path}", "lacks block RAMs of its map", "build it anew, without --from")
         return cls(path, configuration, facts, room, netlist, memories)
+
+    @property
+    def lines(self) -> int | None:
+        """Lines of a band, if the facts tell them."""
+        found = re.search(r"bands of (\d+) lines", self.facts.get("display", ""))
+        return int(found[1]) if found else None
 
     def check_facts(self, facts: Mapping[str, str]) -> None:
         """Refuse a design with other facts.

@@ -3,10 +3,13 @@
 from blysk.golden.video.band_buffer import RGB565, RGB888
 from blysk.sim.api.options import DESIGN, SCENE
 
-__all__ = ["COLOURS", "DEFAULTS", "LOADERS", "OPTIONS"]
+__all__ = ["COLOURS", "DEFAULTS", "DEFAULT_COLOURS", "LOADERS", "OPTIONS"]
 
 COLOURS = {"rgb565": RGB565, "rgb888": RGB888}
 """Pixel formats of the band buffer."""
+
+DEFAULT_COLOURS = "rgb888"
+"""Pixel format without an option."""
 
 LOADERS = ("uart", "flash", "both")
 """Sources of a loader's bytes."""

@@ -33,7 +33,8 @@ class Board:
     luts, block_rams, multipliers : int
         Parts of the device. There are as many flip-flops as look-up tables.
     lines : int
-        Lines of a band. The memory of the device limits this number.
+        Lines of a band, limited by the memory of the device. On a small device a mesh with colours may have
+        half as many.
     loader : str
         Name of the board for openFPGALoader.
     flash : str

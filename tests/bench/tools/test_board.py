@@ -143,14 +143,61 @@ def painted(folder, side=16):
     return str(folder / "a.obj"), str(folder / "b.obj")
 
 
-def test_colours_are_drawn_if_there_is_room(tmp_path):
-    """Boards with a 25F tell why they leave them out."""
-    colours, _ = painted(tmp_path)
-    drawing = gpu_of(BOARDS["ulx3s-85f"], colours, {})[0].drawing
+def grid(side, colored=True, textured=False):
+    """OBJ text of a square of vertices, with vertex colours, texture coordinates, or both."""
+    rows = [(x, y) for y in range(side) for x in range(side)]
+    red = " {} 0 1" if colored else ""
+    lines = ["mtllib b.mtl", "usemtl b"] if textured else []
+    lines += [f"v {x} {y} 0{red.format(x / side)}" for x, y in rows]
+    lines += [f"vt {x / (side - 1)} {y / (side - 1)}" for x, y in rows]
+    corners = [(k, k + 1, k + side + 1, k + side) for k in range(1, side * (side - 1)) if k % side]
+    lines += [f"f {a}/{a} {b}/{b} {c}/{c}" for p, q, r, s in corners for a, b, c in ((p, q, r), (p, r, s))]
+    return "\n".join(lines)
+
+
+@pytest.mark.parametrize("name", BOARDS)
+def test_colours_are_drawn_if_there_is_room(name, tmp_path):
+    """Boards with a 25F draw vertex colours if asked, of larger meshes with smaller bands.
+
+    They tell why they leave out textures, and colours of meshes that are too large.
+    """
+    colours, image = painted(tmp_path)
+    board, wanted = BOARDS[name], {"vertex_colours": True}
+    drawing = gpu_of(board, colours, {}, **wanted)[0].drawing
     assert drawing.mesh.surface == drawing.renderer.geometry.surface == AttributeSpans()
-    told = r"a is drawn without: vertex colours \(the icepi-zero has too few block RAMs for them"
+    if not board.compact:
+        assert gpu_of(board, colours, {})[0].drawing.mesh.surface == AttributeSpans()
+        return
+    told = (
+        rf"a is drawn without: vertex colours \(no placement of them was found on the {name} so far; try --v"
+    )
     with pytest.warns(RuntimeWarning, match=told):
-        gpu_of(BOARDS["icepi-zero"], colours, {})
+        assert gpu_of(board, colours, {})[0].drawing.mesh.surface is None
+    (tmp_path / "large.obj").write_text(grid(23))
+    large = gpu_of(board, str(tmp_path / "large.obj"), {}, **wanted)[0]
+    assert large.drawing.mesh.surface == AttributeSpans()
+    assert (drawing.lines, large.drawing.lines, large.buffer.lines) == (8, 4, 4)
+    told = rf"large is drawn without: vertex colours \(with them the {name} has block RAMs for about 853 tri"
+    less = replace(board, block_rams=46, lines=4)
+    with pytest.warns(RuntimeWarning, match=told):
+        plain = gpu_of(less, str(tmp_path / "large.obj"), {}, **wanted)[0]
+    assert plain.drawing.mesh.surface is None
+    told = rf"b is drawn without: 1 texture \(the {name} has too few multipliers for textures; use ulx3s-85f"
+    with pytest.warns(RuntimeWarning, match=told):
+        gpu_of(board, image, {})
+
+
+def test_a_small_mesh_takes_the_bands_of_a_large_one(tmp_path):
+    """A loader's bitstream for a large mesh with colours has bands of four lines."""
+    small, large = (tmp_path / f"{name}.obj" for name in ("small", "large"))
+    small.write_text(grid(5))
+    large.write_text(grid(23))
+    board = BOARDS["ulx3s-25f"]
+    for made_for, lines in ((None, 8), (str(large), 4)):
+        gpu, *_ = planned(board, str(small), {}, "rgb888", 52.5, None, "uart", made_for, True)
+        assert (gpu.drawing.lines, gpu.buffer.lines) == (lines, lines)
+    first, *_ = planned(board, str(large), {}, "rgb888", 52.5, None, "uart", None, True)
+    assert gpu.loader.decoder.start == first.loader.decoder.start
 
 
 @pytest.mark.ci
@@ -166,7 +213,7 @@ def test_textures_are_drawn_if_there_is_room(tmp_path):
     told = "texture of 64x64 texels, without levels of detail"
     assert f"surface     {told}" in design_lines(board, image, gpu, pattern_on(board)[1])
     for options, block_rams_there, told in (
-        ({}, 125, r"details of images \(32 of 64 texels a side fit the ulx3s-85f\)"),
+        ({}, 123, r"details of images \(32 of 64 texels a side fit the ulx3s-85f\)"),
         ({}, 102, r"1 texture \(the ulx3s-85f has too few block RAMs for them; use ulx3s-85f\)"),
         ({"method": "renormalise"}, 208, r"1 texture \(hardware geometry has no vertex colours"),
     ):
@@ -303,16 +350,23 @@ def memories_of(gpu, monkeypatch):
     return [(depth, width) for depth, width in found if depth >= 64]
 
 
-def test_the_default_of_a_small_board_has_its_block_rams(monkeypatch):
-    """The memories of the whole drawing, each in the fewest block RAMs of one shape, fit the device."""
-    board = BOARDS["ulx3s-25f"]
-    found = memories_of(planned(board, "teapot", {}, None, 52.5)[0], monkeypatch)
-    # The coordinates beside shading and words before the depth test are look-up tables, see `board_build`.
-    found.remove((64, 25))
-    found.remove((64, 67))
-    blocks = [block_rams(depth, width) for depth, width in found]
-    assert len(blocks) > 10
-    assert sum(blocks) <= board.block_rams
+@pytest.mark.parametrize("side", [0, 22, 23])
+def test_drawings_of_a_small_board_have_their_block_rams(side, monkeypatch, tmp_path):
+    """The memories of a whole drawing, each in the fewest block RAMs of one shape, are as many as counted.
+
+    They fit the device: the default, 484 vertices with colours, and 529 in bands of four lines.
+    """
+    board, colored = BOARDS["ulx3s-25f"], side > 0
+    if colored:
+        (tmp_path / "grid.obj").write_text(grid(side))
+    mesh = str(tmp_path / "grid.obj") if colored else "teapot"
+    gpu = planned(board, mesh, {}, "rgb888", 52.5, vertex_colours=True)[0]
+    drawing, found = gpu.drawing, memories_of(gpu, monkeypatch)
+    assert (drawing.mesh.surface is not None) == colored
+    blocks = sum(block_rams(depth, width) for depth, width in found)
+    left = _free_blocks(board, drawing.renderer.design, RGB888, drawing.lines)
+    assert blocks == board.block_rams - left + drawing.mesh.blocks(drawing.assembly.screen_bits)
+    assert blocks <= board.block_rams
 
 
 @pytest.mark.ci
@@ -321,20 +375,12 @@ def test_the_default_of_a_small_board_has_its_block_rams(monkeypatch):
 def test_block_rams_of_colours_and_textures(parts, tmp_path, monkeypatch):
     """The memories of a drawing with colours or a texture are as many block RAMs as the check counts."""
     painted(tmp_path, 64)
-    rows = [(x, y) for y in range(9) for x in range(9)]
-    red = " {} 0 1" if "colors" in parts else ""
-    lines = ["mtllib b.mtl", "usemtl b"] if "coordinates" in parts else []
-    lines += [f"v {x} {y} 0{red.format(x / 8)}" for x, y in rows]
-    lines += [f"vt {x / 8} {y / 8}" for x, y in rows]
-    corners = [(k, k + 1, k + 10, k, k + 10, k + 9) for k in range(1, 72) if k % 9]
-    lines += [f"f {a}/{a} {b}/{b} {c}/{c}" for two in corners for a, b, c in (two[:3], two[3:])]
-    (tmp_path / "c.obj").write_text("\n".join(lines))
+    (tmp_path / "c.obj").write_text(grid(9, "colors" in parts, "coordinates" in parts))
     board = BOARDS["ulx3s-85f"]
-    gpu = planned(board, str(tmp_path / "c.obj"), {}, None, 52.5)[0]
+    gpu = planned(board, str(tmp_path / "c.obj"), {}, "rgb888", 52.5)[0]
     drawing = gpu.drawing
     assert drawing.mesh.surface == AttributeSpans(*(name in parts for name in ("colors", "coordinates")))
-    left = _free_blocks(board, drawing.renderer.design, RGB888) - drawing.mesh.blocks(
-        drawing.assembly.screen_bits
-    )
+    left = _free_blocks(board, drawing.renderer.design, RGB888, board.lines)
+    left -= drawing.mesh.blocks(drawing.assembly.screen_bits)
     found = sum(block_rams(*memory) for memory in memories_of(gpu, monkeypatch))
     assert found == board.block_rams - left

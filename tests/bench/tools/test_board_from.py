@@ -2,6 +2,7 @@
 """``blysk board --from``: another scene in the memories of a routed bitstream."""
 
 import shutil
+from dataclasses import replace
 from fractions import Fraction
 from importlib.util import find_spec
 
@@ -76,7 +77,7 @@ def run(self, name, code, arguments, folder, *others):
 @pytest.fixture(scope="module")
 def routed():
     """Configuration of a teapot of 200 triangles, without place and route."""
-    gpu, _, plan = planned(BOARD, "teapot", {"triangles": 200}, None, 52.5)
+    gpu, _, plan = planned(BOARD, "teapot", {"triangles": 200}, "rgb888", 52.5)
     netlist = netlist_of(BOARD, BoardTop(BOARD, GpuUnit(gpu), plan))
     patterns = netlist.patterns
     layout = [(packed(patterns.bits(name)), width) for name, (width, _) in patterns.words.items()]
@@ -113,7 +114,7 @@ def test_another_scene_is_written(tools, capsys, routed):
     text = (tools / "new.bit").read_text()
     source = RoutedBitstream.of("new.bit", text)
     options = {"triangles": 100, "exponent": 200, "lights": [Light((1, 0, 0.5))], "up": "z"}
-    drawing = planned(BOARD, "teapot", options, None, 52.5, source)[0].drawing
+    drawing = planned(BOARD, "teapot", options, "rgb888", 52.5, source)[0].drawing
     assert source.contents == {name: words for name, (_, words) in words_of(drawing).items()}
     assert text.partition(".bram_init")[0] == routed.partition(".bram_init")[0]
     assert told[-1] == f"bitstream   new.bit, {len(text):,} bytes, read back and equal"
@@ -175,6 +176,18 @@ def test_another_scene_is_written(tools, capsys, routed):
 def test_what_would_change_more_is_refused_in_a_line(arguments, message, refused, tools):
     refused("board", "ulx3s-25f", "--triangles=100", *arguments, "-o", "new.bit", line=message)
     assert not (tools / "new.bit").exists()
+
+
+def test_lines_of_the_bands(routed):
+    """Facts tell the lines of a band, which another mesh keeps."""
+    source = RoutedBitstream.of("x.bit", routed)
+    assert source.lines == 8
+    fewer = replace(source, facts={**source.facts, "display": source.facts["display"].replace("8 l", "4 l")})
+    gpu, _, plan = planned(BOARD, "teapot", {"triangles": 200}, "rgb888", 52.5)
+    with pytest.raises(InputError, match=r"display of its design: .* 4 lines"):
+        fewer.check_facts(facts_of(BOARD, gpu, plan))
+    gpu, *_ = planned(BOARD, "teapot", {"triangles": 200}, "rgb888", 52.5, fewer)
+    assert gpu.buffer.lines == gpu.drawing.lines == 4
 
 
 def test_another_netlist_is_refused(routed):

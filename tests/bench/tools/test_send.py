@@ -42,7 +42,7 @@ def test_bytes_in_a_file(tmp_path, capsys):
     path = tmp_path / "a.packets"
     options = ("--triangles", "100", "--exponent", "300", "--loader", "both", "-o", str(path))
     assert main([*GIVEN, *options]) == 0
-    gpu, *_ = planned(board_named("ulx3s-25f"), "teapot", given, None, 52.5, None, "both")
+    gpu, *_ = planned(board_named("ulx3s-25f"), "teapot", given, "rgb888", 52.5, None, "both")
     told = f"written     {path}, {path.stat().st_size:,} bytes\n"
     assert capsys.readouterr().out.endswith(told)
     decoder = gpu.loader.decoder
