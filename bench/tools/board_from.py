@@ -234,9 +234,9 @@ def rewrite(
 def changed_lines(rewritten: Rewritten) -> Iterator[str]:
     """Lines about the words that have changed, and about all that has not."""
     for name, (words, bits, changed) in rewritten.changed.items():
-        yield f"{name:<12}{changed:,} of {words:,} words of {bits} bits changed"
+        yield f"{name:<13}{changed:,} of {words:,} words of {bits} bits changed"
     changed, blocks = rewritten.blocks
-    yield f"{'unchanged':<12}{blocks - changed} of {blocks} block RAMs, and everything that is no memory"
+    yield f"{'unchanged':<13}{blocks - changed} of {blocks} block RAMs, and everything that is no memory"
 
 
 @contextlib.contextmanager

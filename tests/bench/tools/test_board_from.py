@@ -122,11 +122,11 @@ def test_another_scene_is_written(tools, capsys, routed):
     for name, line in zip(before, told[-6:-2], strict=True):
         changed = sum(a != b for a, b in zip(before[name], source.contents[name], strict=True))
         assert changed
-        assert line.startswith(f"{name:<12}{changed:,} of {len(before[name]):,} words of ")
+        assert line.startswith(f"{name:<13}{changed:,} of {len(before[name]):,} words of ")
     blocks = len(memory_words(text))
     equal = sum((memory_words(text)[k] == words).all() for k, words in memory_words(routed).items())
     assert equal >= 1
-    assert told[-2] == f"unchanged   {equal} of {blocks} block RAMs, and everything that is no memory"
+    assert told[-2] == f"unchanged    {equal} of {blocks} block RAMs, and everything that is no memory"
     assert main(["board", "ulx3s-25f", "--triangles=200", "--from=new.bit", "-o", "back.bit"]) == 0
     assert (tools / "back.bit").read_text() == routed
 
