@@ -126,6 +126,7 @@ release: $(VENV)/.installed-release
 # PAPER_OPTIONS=--quick takes small pictures, in minutes.
 paper: $(VENV)/.installed-bench
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check -e '.[paper]'
+	mkdir -p build/paper
 	$(BIN)/blysk bench build/paper/report --only points --only rivals $(PAPER_OPTIONS)
 	$(BIN)/python -m blysk.bench.quality.paper build/paper/report/report.json
 
