@@ -99,8 +99,8 @@ def of_waiting(unit):
 
 
 # For `SpanHalverUnit` the claim about its whole beat is not decided. Another file proves it for the unit's
-# registers. Another file proves the claim for `VertexSortUnit` with few words.
-APART = "span_halver", "vertex_sort"
+# registers. Other files prove the claim for `VertexSortUnit` and `MeshMemoryUnit` with few words.
+APART = "span_halver", "vertex_sort", "mesh_memory"
 
 
 @pytest.mark.parametrize("name", of_units(name for name in UNITS if name not in APART))
