@@ -25,13 +25,14 @@ def test_table_of_the_guide_is_the_store():
     """Every row of a pipeline has the figures of the store: parts, and a clock rate for each seed."""
     store = {entry["design"]: entry for entry in read_store() if entry["device"] == DEVICE}
     rows = re.findall(
-        r"^\| `([\w-]+)`, `(\w+)`(, 1 - N·H)?(, interval \d)? \| "
+        r"^\| `([\w-]+)`, `(\w+)`(, 1 - N·H)?(, interval \d)?(, 2 lanes)? \| "
         r"([\d,]+) \| ([\d,]+) \| (\d+) \| (\d+) \| ([\d, ]+\d)",
         GUIDE.read_text(encoding="utf-8"),
         re.MULTILINE,
     )
-    for method, model, other, interval, *parts, rates in rows:
-        entry = store[f"pipeline {method}, {model}, 1 light{', one_minus_cosine' * bool(other)}{interval}"]
+    for method, model, other, interval, lanes, *parts, rates in rows:
+        options = f"{', one_minus_cosine' * bool(other)}{interval}{', 2 pixel lanes' * bool(lanes)}"
+        entry = store[f"pipeline {method}, {model}, 1 light{options}"]
         shown = [int(part.replace(",", "")) for part in parts]
         assert shown == [entry[name] for name in ("luts", "flip_flops", "multipliers", "block_rams")], entry
         assert [int(rate) for rate in rates.split(", ")] == sorted(map(round, entry["fmax_mhz"])), entry
