@@ -110,19 +110,21 @@ def untimed(layouts: Sequence[Layout], family: Family = ECP5) -> Iterator[str]:
             )
 
 
+_RUN_AGAIN = {
+    "default_placer": "the static placer found no place for block RAMs or multipliers. nextpnr's default "
+    "placer placed the design.",
+    "rerouted": "the target was out of reach. The design was routed a second time, without another routing "
+    "of slow paths.",
+}
+"""Sentences about facts of `Place`, behind the seeds."""
+
+
 def run_again(layouts: Sequence[Layout]) -> Iterator[str]:
     """A line for each design for which nextpnr was run again with other options, see `Place`."""
     for layout in layouts:
-        if seeds := [str(place.seed) for place in layout.places if place.default_placer]:
-            yield (
-                f"{layout.name}: with seed {', '.join(seeds)} the static placer found no place for block "
-                "RAMs or multipliers. nextpnr's default placer placed the design."
-            )
-        if seeds := [str(place.seed) for place in layout.places if place.rerouted]:
-            yield (
-                f"{layout.name}: with seed {', '.join(seeds)} the target was out of reach. The design was "
-                "routed a second time, without another routing of slow paths."
-            )
+        for fact, said in _RUN_AGAIN.items():
+            if seeds := [str(place.seed) for place in layout.places if getattr(place, fact)]:
+                yield f"{layout.name}: with seed {', '.join(seeds)} {said}"
 
 
 def units_of(names: Sequence[str]) -> Iterator[tuple[str, Callable[[], wiring.Component]]]:
