@@ -60,7 +60,7 @@ CLAIMS: Mapping[str, Callable[[Data], bool]] = {
         max(row["widest"] for row in data["lights"]["rows"] if row["method"] == "quotient") <= 18
     ),
     "The pipeline gives a pixel in each cycle, whatever the length of the spans": lambda data: (
-        # The first pixels of a frame take some cycles more: 3 of the 5,581 of a quick report's smallest frame.
+        # The first pixels of a frame take some cycles more: 3 of 5,581 in a quick report.
         max(_rival(data, "quotient", "cycles")) < 1.001
     ),
     "It takes 13 multipliers with `blinn`": _thirteen_a_light,
