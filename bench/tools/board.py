@@ -98,7 +98,7 @@ def planned(
     """
     lines, first = None, None
     if source is not None:
-        lines = min(source.lines or board.lines, board.lines)
+        lines = min(source.lines, board.lines)
     if made_for is not None:
         first = gpu_of(board, made_for, given, colours, None, vertex_colours)[0]
         lines = first.buffer.lines
@@ -123,7 +123,7 @@ def planned(
 def bitstream_of(board: Board, gpu: Gpu, plan: ClockPlan, seeds: int) -> Built:
     """The bitstream of a drawing, made by `build`. The steps are shown."""
     rates = {name: float(rate) / 1e6 for name, rate in plan.rates.items()}
-    carried = {"facts": facts_of(board, gpu, plan), "room": gpu.drawing.room}
+    carried = carried_of(board, gpu, plan)
     with steps() as show_step:
         top = BoardTop(board, GpuUnit(gpu), plan)
         return build(board, top, rates, seeds, show_step, carried)
@@ -142,6 +142,11 @@ def _same_netlist(source: RoutedBitstream, board: Board, gpu: Gpu, plan: ClockPl
     netlist = BoardNetlist.of(board, BoardTop(board, GpuUnit(gpu), plan))
     source.check_netlist(netlist)
     return netlist
+
+
+def carried_of(board: Board, gpu: Gpu, plan: ClockPlan) -> dict[str, Any]:
+    """Facts for the comment in a bitstream; see `RoutedBitstream`."""
+    return {"facts": facts_of(board, gpu, plan), "room": gpu.drawing.room, "lines": gpu.buffer.lines}
 
 
 def facts_of(board: Board, gpu: Gpu, plan: ClockPlan) -> dict[str, str]:

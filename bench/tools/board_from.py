@@ -1,7 +1,6 @@
 """A bitstream with another scene in its memories, made from a routed bitstream without place and route."""
 
 import contextlib
-import re
 import tempfile
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
@@ -39,6 +38,8 @@ class RoutedBitstream:
         Facts about the design, by name.
     room : Room
         Words that the memories have room for.
+    lines : int
+        Lines of a band.
     netlist : str
         Digest of the netlist, `BoardNetlist.digest`.
     memories : MemoryMap
@@ -49,6 +50,7 @@ class RoutedBitstream:
     configuration: str
     facts: Mapping[str, str]
     room: Room
+    lines: int
     netlist: str
     memories: MemoryMap
 
@@ -85,20 +87,14 @@ class RoutedBitstream:
                 raise KeyError
             memories = MemoryMap.from_json(comment["memories"])
             facts, room = dict(comment["facts"]), Room(*comment["room"])
-            netlist = str(comment["netlist"])
+            lines, netlist = int(comment["lines"]), str(comment["netlist"])
         except (AttributeError, KeyError, TypeError, ValueError, IndexError):
             reason = "does not carry a map of its memories"
             remedy = "build it anew with this version of blysk board, without --from"
             raise InputError(f"--from {path}", reason, remedy) from None
         if not memories.blocks.keys() <= memory_words(configuration).keys():
             raise InputError(f"--from {path}", "lacks block RAMs of its map", "build it anew, without --from")
-        return cls(path, configuration, facts, room, netlist, memories)
-
-    @property
-    def lines(self) -> int | None:
-        """Lines of a band, if the facts tell them."""
-        found = re.search(r"bands of (\d+) lines", self.facts.get("display", ""))
-        return int(found[1]) if found else None
+        return cls(path, configuration, facts, room, lines, netlist, memories)
 
     def check_facts(self, facts: Mapping[str, str]) -> None:
         """Refuse a design with other facts.

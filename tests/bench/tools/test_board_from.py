@@ -12,7 +12,7 @@ from amaranth.hdl import Module, Signal, Value
 from amaranth.lib import data, wiring
 from amaranth.lib.wiring import Out
 
-from blysk.bench.tools.board import facts_of, planned
+from blysk.bench.tools.board import carried_of, facts_of, planned
 from blysk.bench.tools.board_build import BoardNetlist, build
 from blysk.bench.tools.board_design import BoardTop
 from blysk.bench.tools.board_from import RoutedBitstream, rewrite
@@ -85,8 +85,7 @@ def routed():
     text = HEAD + "\n".join(section(*block) for block in blocks.items())
     memories = MemoryMap.found(memory_words(text), patterns)
     comment = {
-        "facts": facts_of(BOARD, gpu, plan),
-        "room": gpu.drawing.room,
+        **carried_of(BOARD, gpu, plan),
         "netlist": netlist.digest,
         "memories": memories.to_json(),
     }
@@ -179,10 +178,11 @@ def test_what_would_change_more_is_refused_in_a_line(arguments, message, refused
 
 
 def test_lines_of_the_bands(routed):
-    """Facts tell the lines of a band, which another mesh keeps."""
+    """The bitstream carries the lines of a band, which another mesh keeps."""
     source = RoutedBitstream.of("x.bit", routed)
     assert source.lines == 8
-    fewer = replace(source, facts={**source.facts, "display": source.facts["display"].replace("8 l", "4 l")})
+    display = source.facts["display"].replace("8 l", "4 l")
+    fewer = replace(source, lines=4, facts={**source.facts, "display": display})
     gpu, _, plan = planned(BOARD, "teapot", {"triangles": 200}, "rgb888", 52.5)
     with pytest.raises(InputError, match=r"display of its design: .* 4 lines"):
         fewer.check_facts(facts_of(BOARD, gpu, plan))
@@ -278,7 +278,7 @@ def test_a_placed_design_draws_another_scene(tmp_path):
         BOARD,
         BoardTop(BOARD, MemoriesTop(first), plan),
         rates,
-        carried={"facts": {"board": "x"}, "room": room},
+        carried={"facts": {"board": "x"}, "room": room, "lines": 8},
     )
     (tmp_path / "first.bit").write_bytes(built.bitstream)
     source = RoutedBitstream.read(str(tmp_path / "first.bit"))
