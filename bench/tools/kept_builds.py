@@ -23,10 +23,10 @@ class KeptBuild:
     Attributes
     ----------
     MOST : int
-        Number of builds that stay. A new build replaces the oldest.
+        Number of builds that stay. A new build replaces the oldest. A board's build takes about 50 MB.
     """
 
-    MOST = 4
+    MOST = 12
 
     def __init__(self, inputs: Iterable[str | bytes]):
         digest = hashlib.sha256()
@@ -36,11 +36,14 @@ class KeptBuild:
         self._folder = builds / digest.hexdigest()
         # A build that is not kept takes longer when it is run again, and nothing else.
         with contextlib.suppress(OSError):
-            self._folder.mkdir(mode=0o700, parents=True, exist_ok=True)
+            self._make()
             self._folder.touch()
             oldest_last = sorted(builds.iterdir(), key=lambda path: path.stat().st_mtime, reverse=True)
             for old in oldest_last[self.MOST :]:
                 shutil.rmtree(old, ignore_errors=True)
+
+    def _make(self) -> None:
+        self._folder.mkdir(mode=0o700, parents=True, exist_ok=True)
 
     def take(self, folder: Path, *names: str) -> bool:
         """Copy kept files into a folder. ``False`` if one of them is not kept. Nothing is copied then."""
@@ -58,6 +61,8 @@ class KeptBuild:
         for name in names:
             temporary = self._folder / f".{os.getpid()}-{name}"
             with contextlib.suppress(OSError):
+                # Newer builds may have replaced the folder since.
+                self._make()
                 try:
                     shutil.copyfile(folder / name, temporary)
                     os.replace(temporary, self._folder / name)

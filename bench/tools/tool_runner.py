@@ -24,6 +24,9 @@ _TOLD = 30
 _ROUND = re.compile(r"^Info:\s+iter=(\d+) wires=\d+ overused=(\d+)", re.MULTILINE)
 """A round of the router in nextpnr's log, and the number of wires that are used twice."""
 
+_SPREAD = re.compile(r"^Info: overlap: COMB=([\d.]+)%", re.MULTILINE)
+"""A round of the static placer in nextpnr's log, and the share of logic cells that overlap."""
+
 MOUNT = "/job"
 """Path, in the tool's sandbox, of the folder in which it runs. The tool sees only this folder."""
 
@@ -48,7 +51,8 @@ class Watch:
     step : str
         Name of the step, such as ``placement 2``.
     tell : callable
-        Called with each line: the step, the router's last round, and the time since the watch was made.
+        Called with each line: the step, the last round of router or placer, and the time since the watch was
+        made.
     stuck : callable, optional
         Called with the tool's output so far. It returns the reason to give the tool up, or an empty text.
     """
@@ -64,7 +68,13 @@ class Watch:
         now = time.monotonic()
         if now - self._told >= _TOLD:
             self._told = now
-            rounds = [f"round {number}, {wires} wires used twice" for number, wires in _ROUND.findall(said)]
+            rounds = [
+                *(
+                    f"placer's round {k}, {share} % overlap"
+                    for k, share in enumerate(_SPREAD.findall(said), 1)
+                ),
+                *(f"round {number}, {wires} wires used twice" for number, wires in _ROUND.findall(said)),
+            ]
             passed = f"{int(now - self._begin) // 60}:{int(now - self._begin) % 60:02} min"
             self._tell(f"{self._step}: {', '.join([*rounds[-1:], passed])}")
         return self._stuck(said)
@@ -103,7 +113,8 @@ class ToolRunner:
                 process = Process(
                     command,
                     cwd=folder,
-                    env={**os.environ, "YOWASP_MOUNT": f"{MOUNT}=."},
+                    # The tool's own temporary files go with the folder, also when the tool is killed.
+                    env={**os.environ, "TMPDIR": str(folder), "YOWASP_MOUNT": f"{MOUNT}=."},
                     stdin=given,
                     stdout=log,
                     stderr=subprocess.STDOUT,

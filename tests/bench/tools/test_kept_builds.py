@@ -6,7 +6,7 @@ from blysk.bench.tools import board_build, tool_runner
 from blysk.bench.tools.absorb_registers import Absorbed
 from blysk.bench.tools.board_build import Clock, build
 from blysk.bench.tools.kept_builds import KeptBuild
-from blysk.bench.tools.tool_runner import GivenUp, ToolRunner, Watch
+from blysk.bench.tools.tool_runner import GivenUp, ToolError, ToolRunner, Watch
 
 
 @pytest.fixture
@@ -34,6 +34,23 @@ def test_the_newest_builds_stay(folder):
     assert len(list((folder.parent / "cache" / "builds").iterdir())) == KeptBuild.MOST
 
 
+def test_a_build_that_was_replaced_meanwhile_keeps_what_it_has_done(folder):
+    (folder / "a").write_text("1")
+    slow = KeptBuild(["slow"])
+    for number in range(KeptBuild.MOST):
+        KeptBuild([str(number)])
+    slow.keep(folder, "a")
+    assert KeptBuild(["slow"]).take(folder, "a")
+
+
+def test_temporary_files_of_a_killed_tool_go_with_its_folder(tmp_path):
+    """A tool in a sandbox leaves a folder for each run that is killed."""
+    code = "import os, tempfile; tempfile.mkdtemp(); os.kill(os.getpid(), 9)"
+    with pytest.raises(ToolError):
+        ToolRunner().run("tool", code, [], tmp_path)
+    assert len(list(tmp_path.iterdir())) == 1
+
+
 def test_a_watch_tells_the_last_round(monkeypatch):
     now, told = [100.0], []
     monkeypatch.setattr(tool_runner.time, "monotonic", lambda: now[0])
@@ -45,8 +62,11 @@ def test_a_watch_tells_the_last_round(monkeypatch):
     now[0] += 10
     assert [watch(f"{log}Info: iter=3"), len(told)] == ["stuck", 1]
     now[0] += 20
+    watch("Info: overlap: COMB=69.2%, FF=64.6%\nInfo: overlap: COMB=5.0%, FF=64.6%\n")
+    assert told.pop() == "placement 2: placer's round 2, 5.0 % overlap, 2:00 min"
+    now[0] += 30
     watch("")
-    assert told[1:] == ["placement 2: 2:00 min"]
+    assert told[1:] == ["placement 2: 2:30 min"]
 
 
 class Platform:
