@@ -9,6 +9,7 @@ from blysk.bench.web.web_folder import PAGE, check_extras, check_folder, docs_fi
 from blysk.golden.presets import METHODS, MIRROR_LOBES, MODELS
 from blysk.sim.errors import InputError
 from blysk.sim.frames.workers import processors
+from blysk.sim.run_files import reads
 from blysk.sim.value_types import Whole
 
 __all__ = ["command"]
@@ -86,7 +87,8 @@ def command(folder, report, docs, designs, jobs):
     if docs is not None:
         docs_files(docs)
     if report is not None:
-        report_files(report)
+        for path in report_files(report):
+            reads(path)
     check_extras()
     from blysk.bench.web.web import make_site
 

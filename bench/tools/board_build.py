@@ -168,7 +168,8 @@ class BoardNetlist:
         """The netlist of a top that requests its pins from the platform."""
         patterns = ScenePatterns()
         with contents_from(patterns):
-            files = board.make().prepare(top, "top", debug_verilog=False).files
+            # Places of the source code would tell a moved project from the mapped and routed design.
+            files = board.make().prepare(top, "top", debug_verilog=False, emit_src=False).files
         netlist, constraints = (
             text if isinstance(text, bytes) else text.encode() for text in (files["top.il"], files["top.lpf"])
         )
@@ -176,9 +177,8 @@ class BoardNetlist:
 
     @property
     def digest(self) -> str:
-        """Digest of netlist and constraints, without the places of the source code."""
-        netlist = re.sub(rb"(?m)^\s*attribute \\src .*\n", b"", self.netlist)
-        return hashlib.sha256(hashlib.sha256(netlist).digest() + self.constraints).hexdigest()
+        """Digest of netlist and constraints."""
+        return hashlib.sha256(hashlib.sha256(self.netlist).digest() + self.constraints).hexdigest()
 
 
 def _script(draw: float) -> str:

@@ -8,7 +8,6 @@ from typing import Any
 from blysk.sim.errors import InputError
 from blysk.sim.installation import install_extra
 from blysk.sim.output import files_within
-from blysk.sim.run_files import reads
 
 __all__ = ["MARK", "PAGE", "check_extras", "check_folder", "docs_files", "earlier", "report_files"]
 
@@ -78,6 +77,4 @@ def report_files(folder: Path) -> list[Path]:
     files = [folder / name for name in names if Path(name).name == name]
     if not files or not all(path.is_file() for path in files):
         raise InputError(f"--report {folder}", "is not a report", "make one with `blysk bench FOLDER`")
-    for path in files:
-        reads(path)
     return files

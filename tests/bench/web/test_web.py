@@ -23,6 +23,7 @@ from blysk.sim.engines.probes import probes_of
 from blysk.sim.engines.wasm import fields_of
 from blysk.sim.errors import InputError
 from blysk.sim.installation import install_extra
+from blysk.sim.run_files import RunFiles
 
 from ..reader import Reader
 
@@ -382,7 +383,9 @@ def test_folder_of_documents(docs):
 
 
 def run(*arguments):
-    return CliRunner().invoke(command, list(map(str, arguments)))
+    """Run the command as the program does, which records what it reads and writes."""
+    with RunFiles().active():
+        return CliRunner().invoke(command, list(map(str, arguments)))
 
 
 def test_command(tmp_path, monkeypatch, work, results, plain_section):
