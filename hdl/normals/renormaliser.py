@@ -26,10 +26,11 @@ class RenormaliserUnit(PipelinedUnit):
 
     `Renormaliser`, the bit-accurate model, has segments, formats, error bounds and flag.
 
-    The latency is 16 cycles (leading one, its place, two for the shift, three for the dot product, octave,
-    table, four for the polynomial, product, rounding, saturation). The initiation interval is 1. The unit has
-    eight multipliers: three squares, two in the polynomial, three products with the factor. The table holds
-    64 words of 48 bits.
+    The latency is 25 cycles: leading one, its place, two for the shift, rounding, operands of the squares,
+    three for the dot product, octave, segment, two for the table, operand of the polynomial, product,
+    difference, rounding, product, difference, rounding, saturation, operand of the last products, product,
+    rounding, saturation. The initiation interval is 1. The unit has eight multipliers: three squares, two in
+    the polynomial, three products with the factor. The table holds 64 words of 48 bits.
 
     Parameters
     ----------
@@ -49,9 +50,11 @@ class RenormaliserUnit(PipelinedUnit):
 
     FORMULAS: ClassVar[dict[str, str]] = {
         "square_term": "c_2·x",
+        "exact_slope": "c_1 − c_2·x",
         "slope": "c_1 − c_2·x",
         "linear_term": "x·(c_1 − c_2·x)",
-        "r": "r = c_0 − x·(c_1 − c_2·x)",
+        "exact_r": "c_0 − x·(c_1 − c_2·x)",
+        r"rounded_r|r_\d+": "r = c_0 − x·(c_1 − c_2·x)",
         r"x_\d+": "x",
         r"c(\d)_\d+": r"c_\1",
         r"product_(\d)": r"r·w_\1",
@@ -64,7 +67,7 @@ class RenormaliserUnit(PipelinedUnit):
         super().__init__(
             data.StructLayout({"vector": vector_shape(), "span": 1}),
             data.StructLayout({"normal": normal_shape(), "out_of_range": unsigned(1), "span": 1}),
-            latency=16,
+            latency=25,
         )
 
     def _delayed(self, m, value, name, first, last):
@@ -75,44 +78,51 @@ class RenormaliserUnit(PipelinedUnit):
 
     def datapath(self, m, operands):
         """Shift, square, octave and offset in its segment, ``c0 - x (c1 - x c2)``, ``r w``."""
-        p, register = self.model, self.register
+        register = self.register
         word, too_short = self._scaled(m, operands.vector)
+        word = [register(m, word[c], f"word_{c}_6") for c in range(3)]
         m.submodules.dot_product = dot_product = DotProductUnit()
         for c in range(3):
             m.d.comb += [dot_product.i.payload.a[c].eq(word[c]), dot_product.i.payload.b[c].eq(word[c])]
         m.d.comb += [dot_product.i.valid.eq(1), dot_product.o.ready.eq(1)]
-        word = [self._delayed(m, word[c], f"word_{c}", 5, 13) for c in range(3)]
-
-        square = dot_product.o.payload.as_value()
-        octave = sum(square[33 + k :].any() for k in range(p.OCTAVES - 1))
-        fraction = (square[11:37].as_unsigned() >> octave)[: p.SEGMENT_BITS + p.OFFSET_FORMAT.width]
-        octave = register(m, octave[:2], "octave")
-        fraction = register(m, fraction, "fraction")
-        bits = p.OFFSET_FORMAT.width
-        c0, c1, c2 = self._coefficients(m, Cat(fraction[bits:], octave))
-        x = FixedValue(p.OFFSET_FORMAT, register(m, fraction[:bits], "x_9"))
-
-        square_term = register(m, x * c2, "square_term")
-        c0, c1, x = register(m, c0, "c0_10"), register(m, c1, "c1_10"), register(m, x, "x_10")
-        slope = (c1 - square_term).round_half_up(p.C1_FORMAT.fraction_bits).wrap(p.C1_FORMAT)
-        slope = register(m, slope, "slope")
-        c0, x = register(m, c0, "c0_11"), register(m, x, "x_11")
-        linear_term = register(m, x * slope, "linear_term")
-        c0 = register(m, c0, "c0_12")
-        r = (c0 - linear_term).round_half_up(p.FACTOR_FORMAT.fraction_bits).saturate(p.FACTOR_FORMAT)
-        r = register(m, r, "r")
+        word = [self._delayed(m, word[c], f"word_{c}", 7, 22) for c in range(3)]
+        r = self._factor(m, dot_product.o.payload.as_value())
 
         result = Signal(self.o.payload.shape())
-        m.d.comb += result.out_of_range.eq(self._delayed(m, too_short, "too_short", 3, 16))
-        m.d.comb += result.span.eq(self._delayed(m, operands.span, "span", 1, 16))
+        m.d.comb += result.out_of_range.eq(self._delayed(m, too_short, "too_short", 3, 25))
+        m.d.comb += result.span.eq(self._delayed(m, operands.span, "span", 1, 25))
         for c in range(3):
             product = register(m, word[c] * r, f"product_{c}")
             rounded = register(m, product.round_half_up(COMPONENT.fraction_bits), f"rounded_{c}")
             m.d.comb += result.normal[c].eq(register(m, rounded.saturate(COMPONENT), f"normal_{c}"))
         return result
 
+    def _factor(self, m, square):
+        """``r = c0 - x (c1 - x c2)``, 13 cycles after the square. Each operand has a register of its own."""
+        p, register = self.model, self.register
+        octave = sum(square[33 + k :].any() for k in range(p.OCTAVES - 1))
+        octave = register(m, octave[:2], "octave")
+        square = register(m, square[11:37].as_unsigned(), "square")
+        fraction = register(m, (square >> octave)[: p.SEGMENT_BITS + p.OFFSET_FORMAT.width], "fraction")
+        octave = register(m, octave, "octave_11")
+        bits = p.OFFSET_FORMAT.width
+        table = self._coefficients(m, Cat(fraction[bits:], octave))
+        c0, c1, c2 = (register(m, c, f"c{k}_13") for k, c in enumerate(table))
+        x = FixedValue(p.OFFSET_FORMAT, self._delayed(m, fraction[:bits], "x", 12, 14))
+
+        square_term = register(m, x * register(m, c2, "c2_14"), "square_term")
+        c1, x = self._delayed(m, c1, "c1", 14, 15), self._delayed(m, x, "x", 15, 17)
+        # Rounding reads a bit under its last place, and no more.
+        slope = (c1 - square_term).truncate(p.C1_FORMAT.fraction_bits + 1)
+        slope = register(m, slope, "exact_slope").round_half_up(p.C1_FORMAT.fraction_bits)
+        linear_term = register(m, x * register(m, slope.wrap(p.C1_FORMAT), "slope"), "linear_term")
+        difference = self._delayed(m, c0, "c0", 14, 18) - linear_term
+        r = register(m, difference.truncate(p.FACTOR_FORMAT.fraction_bits + 1), "exact_r")
+        r = register(m, r.round_half_up(p.FACTOR_FORMAT.fraction_bits), "rounded_r")
+        return self._delayed(m, r.saturate(p.FACTOR_FORMAT), "r", 21, 22)
+
     def _scaled(self, m, vector):
-        """Word w four cycles after the vector, and after two cycles whether the vector is too short."""
+        """Word w five cycles after the vector, and after two cycles whether the vector is too short."""
         p, register = self.model, self.register
         codes = [vector[c].as_value() for c in range(3)]
         magnitudes = [Mux(code[-1], ~code, code)[:-1] for code in codes]
@@ -132,9 +142,9 @@ class RenormaliserUnit(PipelinedUnit):
         place = register(m, place[:2], "place_3")
         word = []
         for c, code in enumerate(coarse):
-            fine = FixedValue(p.VECTOR_FORMAT, (code << place)[: len(code)].as_signed())
-            rounded = fine.round_half_up(COMPONENT.fraction_bits).saturate(COMPONENT)
-            word.append(register(m, rounded, f"word_{c}_4"))
+            fine = register(m, (code << place)[: len(code)].as_signed(), f"fine_{c}")
+            rounded = FixedValue(p.VECTOR_FORMAT, fine).round_half_up(COMPONENT.fraction_bits)
+            word.append(register(m, rounded.saturate(COMPONENT), f"word_{c}_5"))
         return word, too_short
 
     def _coefficients(self, m, segment):

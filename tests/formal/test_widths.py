@@ -158,7 +158,7 @@ CUTS = {
     "blysk.hdl.normals.adaptive_normaliser.AdaptiveNormaliserUnit._bisect": "an address, 2^depth at most",
     "blysk.hdl.normals.adaptive_normaliser.AdaptiveNormaliserUnit._end_segment": "the same",
     "blysk.hdl.normals.renormaliser.RenormaliserUnit._scaled": "copies of the sign, above the leading one",
-    "blysk.hdl.normals.renormaliser.RenormaliserUnit.datapath": "the leading one of the octave",
+    "blysk.hdl.normals.renormaliser.RenormaliserUnit._factor": "the leading one of the octave",
     "blysk.hdl.normals.adaptive_normaliser.AdaptiveNormaliserUnit._reciprocal": "as of m - 1 above",
     "blysk.hdl.cosines.half_chord.normalised_words": "v: `test_angular_setup`",
     "blysk.hdl.cosines.half_chord.half_chord_words": "half a turn less psi, as the model wraps it",

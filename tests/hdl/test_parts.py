@@ -176,7 +176,7 @@ def test_unknown_form(make, form):
 def test_times_and_parts_of_the_renormaliser():
     unit = RenormaliserUnit()
     cost = cost_of(unit)
-    assert (unit.latency, unit.initiation_interval) == (16, 1)
+    assert (unit.latency, unit.initiation_interval) == (25, 1)
     assert (cost.multiplier_count, cost.constant_multipliers, cost.rom_bits) == (8, 0, 64 * 48)
     assert all(max(pair) <= 18 for pair in cost.multipliers)
 

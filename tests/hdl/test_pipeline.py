@@ -103,7 +103,7 @@ def test_cycles(method, interval):
     ("method", "latency", "interval"),
     [
         pytest.param("quadratic", 73, 4, marks=pytest.mark.long),
-        ("renormalise", 58, 3),
+        ("renormalise", 67, 3),
     ],
 )
 def test_cycles_of_long_spans(method, latency, interval, lights):

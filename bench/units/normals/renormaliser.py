@@ -96,9 +96,11 @@ RECORD = Record(
         "dot_product.*": "The unit takes each dot product at once, so the skid buffer inside is never used.",
     },
     still={
-        "c2 is at most 0.695, c1 at most 0.9988, and no negative word is subtracted from c1": (
-            "coefficients.port__data[35] coefficients.port__data[47] c1_10[16] slope[16]"
+        "c2 is at most 0.695, c1 at most 0.9988; c1 - x c2 is between 0 and 1, and r between 0 and 2": (
+            "coefficients.port__data[35] coefficients.port__data[47] c1[16] c2[11] slope[16] "
+            "exact_slope[17-18] exact_r[18] rounded_r[17-18]"
         ),
+        "a squared length is at most 3": "square[25]",
         "a product is less than 1/16 if its factors are less than 1/16 and 1": (
             "square_term[28] linear_term[33]"
         ),
