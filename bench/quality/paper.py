@@ -133,9 +133,10 @@ def rivals_of(tables: Mapping[str, Mapping[str, Any]]) -> dict[str, Any]:
           each mesh ``errors`` in LSB before rounding, ``cycles`` a pixel, and ``switched`` bits a pixel or
           ``None``;
         - ``fronts``: for each mesh the methods with Blinn's highlight on the front of error against ``area``
-          times cycles, and of error against ``switched`` bits.
+          times cycles, of error against ``switched`` bits, and of error against look-up tables times time of
+          ``placed`` designs.
     """
-    from blysk.bench.report.rivals import front_of
+    from blysk.bench.report.rivals_fronts import front_of
     from blysk.golden.rivals.registry import COMPARED
 
     parts, errors = tables["rivals-parts"]["rows"], tables["rivals-errors"]["rows"]
@@ -173,6 +174,11 @@ def rivals_of(tables: Mapping[str, Mapping[str, Any]]) -> dict[str, Any]:
         fronts["switched"].append(
             front_of({of["method"]: (of["switched"][k], of["errors"][k]) for of in counted})
         )
+    by_tables = sorted(tables["rivals-placed"]["rows"], key=lambda row: row["tables times ns"])
+    fronts["placed"] = [
+        [of["method"] for of in by_tables if of["mesh"] == mesh and of["on the front of tables"]]
+        for mesh in meshes
+    ]
     return {"meshes": meshes, "most": most, "rows": rows, "fronts": fronts}
 
 

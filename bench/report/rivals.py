@@ -12,14 +12,21 @@ from typing import Any
 import numpy as np
 
 from blysk.bench.accuracy import scene_for
-from blysk.bench.colors import style_of
-from blysk.bench.labels import Label, place_labels
 from blysk.bench.report.counted import Counted
-from blysk.bench.report.section import Cell, Drawing, Section, Table
+from blysk.bench.report.rivals_fronts import (
+    DRAWN,
+    PRODUCT_AREA,
+    area_of,
+    counts,
+    drawings,
+    listed,
+    placed_table,
+    title_of,
+)
+from blysk.bench.report.section import Cell, Section, Table
 from blysk.bench.ring import ring
 from blysk.bench.speed.cycle_model import frame_cycles, unit_of
 from blysk.bench.store import Task
-from blysk.bench.svg import panels, svg
 from blysk.golden.frames.border import border_mask
 from blysk.golden.reference.lighting import Light
 from blysk.golden.reference.raster import Raster, rasterise
@@ -36,10 +43,7 @@ from blysk.sim.meshes.teapot import teapot
 
 __all__ = [
     "LIGHTS",
-    "PRODUCT_AREA",
-    "area_of",
     "errors",
-    "front_of",
     "host_work",
     "parts",
     "section",
@@ -49,9 +53,6 @@ __all__ = [
 LIGHTS = (1, 2, 4, 8)
 
 EXPONENTS = (10, 100, 1000)
-
-DRAWN = 100
-"""Exponent of the drawings, and of switched bits."""
 
 QUICK, FULL = (
     ((160, 120), ("teapot-1000", "ring-36")),
@@ -65,9 +66,6 @@ QUICK, FULL = (
 SHARED_LSB = 0.25
 """An error of a triangle counts from here on, in LSB before rounding."""
 
-PRODUCT_AREA = 18 * 18
-"""Bits of adders that stand for a multiplier of 18x18 bits: one for each partial product."""
-
 
 @lru_cache(maxsize=2)
 def _rastered(mesh: str, size: tuple[int, int]) -> tuple[Scene, Raster]:
@@ -79,13 +77,17 @@ def _rastered(mesh: str, size: tuple[int, int]) -> tuple[Scene, Raster]:
 
 def _lit(scene: Scene, lights: int) -> Scene:
     """The scene with its light divided into equal lights, which stand round an upright axis."""
+    if lights == 1:
+        return scene
     (light,) = scene.lights
     directions = turned(light.direction, (0, 1, 0), lights).tolist()
     return replace(scene, lights=[Light(tuple(of), (1 / lights,) * 3) for of in directions])
 
 
-def errors(name: str, mesh: str, size: Sequence[int], exponents: Sequence[int]) -> list[dict[str, Any]]:
-    """Errors, cycles and switched bits of a method in frames with one light.
+def errors(
+    name: str, mesh: str, size: Sequence[int], exponents: Sequence[int], lights: int = 1
+) -> list[dict[str, Any]]:
+    """Errors, cycles and switched bits of a method in frames.
 
     Parameters
     ----------
@@ -97,6 +99,8 @@ def errors(name: str, mesh: str, size: Sequence[int], exponents: Sequence[int]) 
         Width and height.
     exponents : sequence of int
         Exponents, with a frame for each.
+    lights : int
+        Number of lights, see `_lit`.
 
     Returns
     -------
@@ -111,6 +115,7 @@ def errors(name: str, mesh: str, size: Sequence[int], exponents: Sequence[int]) 
     """
     rival = COMPARED[name]
     scene, raster = _rastered(mesh, tuple(size))
+    scene = _lit(scene, lights)
     found = []
     for exponent in exponents:
         scene = replace(scene, material=replace(scene.material, exponent=exponent))
@@ -227,7 +232,10 @@ def parts(name: str, lights: int, mesh: str, size: Sequence[int], netlist: bool)
 
 
 def tasks(quick: bool) -> list[Task]:
-    """Errors of every method on every mesh, and its parts with each number of `LIGHTS`."""
+    """Errors of every method on every mesh, and its parts and errors with each number of `LIGHTS`.
+
+    Errors with several lights are those of the mesh `_middle` at the exponent `DRAWN`.
+    """
     size, meshes = QUICK if quick else FULL
     exponents = [DRAWN] if quick else list(EXPONENTS)
     where = {"mesh": QUICK[1][0], "size": list(QUICK[0]), "netlist": not quick}
@@ -236,168 +244,54 @@ def tasks(quick: bool) -> list[Task]:
         for mesh in meshes
         for name in COMPARED
     ]
+    several = {"mesh": _middle(meshes), "size": list(size), "exponents": [DRAWN]}
+    found += [
+        Task(errors, {"name": name, **several, "lights": lights})
+        for name in COMPARED
+        for lights in LIGHTS[1:]
+        if counts(name)
+    ]
     return found + [
         Task(parts, {"name": name, "lights": lights, **where}) for name in COMPARED for lights in LIGHTS
     ]
 
 
-def area_of(of: Mapping[str, Any]) -> int | None:
-    """Area of the result of `parts`, in bits of adders: `PRODUCT_AREA` for a multiplier, and its adders."""
-    if of["multipliers"] is None:
-        return None
-    area: int = PRODUCT_AREA * of["multipliers"] + of["adder_bits"]
-    return area
-
-
-def front_of(points: Mapping[str, tuple[float, float]]) -> list[str]:
-    """Names of the points that no other point beats in both numbers, from the smallest first number on.
-
-    A point beats another if it is at most as large in both numbers, and smaller in one.
-    """
-    found = []
-    for name, (x, y) in points.items():
-        better = any(
-            a <= x and b <= y and (a, b) != (x, y) for other, (a, b) in points.items() if other != name
-        )
-        if not better:
-            found.append(name)
-    return sorted(found, key=lambda name: points[name])
+def _middle(meshes: Sequence[str]) -> str:
+    """Mesh of the comparison by numbers of lights."""
+    return meshes[min(1, len(meshes) - 1)]
 
 
 def section(tasks: Sequence[Task], results: Sequence[Any]) -> Section:
     """The section: parts, host work and errors of every method, and fronts of methods."""
     of_mesh: dict[str, dict[str, list[dict]]] = {}
     of_lights: dict[int, dict[str, dict]] = {}
+    frames_of: dict[int, dict[str, list[dict]]] = {1: {}}
     for task, result in zip(tasks, results, strict=True):
         settings = task.settings
-        if task.function is errors:
+        if task.function is errors and "lights" in settings:
+            frames_of.setdefault(settings["lights"], {})[settings["name"]] = result
+        elif task.function is errors:
             of_mesh.setdefault(settings["mesh"], {})[settings["name"]] = result
         else:
             of_lights.setdefault(settings["lights"], {})[settings["name"]] = result
-    drawings = _drawings(of_mesh, of_lights)
+    frames_of[1] = of_mesh[_middle(list(of_mesh))]
+    drawn = drawings(of_mesh, of_lights, frames_of)
     text = [
         "A referee asks for methods of other people, in their best form. This section measures them beside "
         "ours: each by a bit-accurate model or by its hardware, all by the same rules. "
         "`docs/theory/rivals.md` has formulas, words and rules.",
-        f"{_listed(name for name in COMPARED if COMPARED[name].HARDWARE)} have hardware in this project. "
-        f"{_listed(name for name in RIVALS if not RIVALS[name].HARDWARE)} are models alone. Models have no "
-        "clock rate, and nothing here compares clock rates.",
-        *(text for _, text in drawings),
+        f"{listed(name for name in COMPARED if COMPARED[name].HARDWARE)} have hardware in this project. "
+        f"{listed(name for name in RIVALS if not RIVALS[name].HARDWARE)} are models alone, and have no "
+        "clock rate.",
+        *(text for _, text in drawn),
         "`quotient, phong` and `loisel` draw highlights of R·V, and their errors are against exact Phong "
         "shading. They are drawn, but they are not on a front. The errors of all others are against exact "
         "Blinn shading. Errors are before the rounding of pixels, which adds half an LSB to each method. "
         "Area times time is the number of bits of adders, times cycles a pixel. A multiplier stands for "
         f"{PRODUCT_AREA} of these bits.",
     ]
-    parts = [_parts_table(of_lights), _host_table(of_lights), _errors_table(of_mesh)]
-    return Section("rivals", "Rivals", text, [*parts, *(drawing for drawing, _ in drawings)])
-
-
-def _listed(names) -> str:
-    names = [f"`{name}`" for name in names]
-    return f"{', '.join(names[:-1])} and {names[-1]}"
-
-
-def _title(mesh: str, of: Mapping[str, Sequence[Mapping[str, Any]]]) -> str:
-    kind = "teapot" if mesh.startswith("teapot") else "torus"
-    return f"{kind}, {next(iter(of.values()))[0]['triangles']:,} triangles"
-
-
-def _drawn(found: Sequence[Mapping[str, Any]]) -> Mapping[str, Any]:
-    """The frame of the drawn exponent."""
-    return next(of for of in found if of["exponent"] == DRAWN)
-
-
-def _drawings(of_mesh: Mapping, of_lights: Mapping) -> list[tuple[Drawing, str]]:
-    """Drawings of the fronts, each with a sentence."""
-    parts = of_lights[1]
-    by_area = {
-        _title(mesh, of): {
-            name: (area_of(parts[name]) * _drawn(found)["cycles"], _drawn(found)["max_lsb"])
-            for name, found in of.items()
-        }
-        for mesh, of in of_mesh.items()
-    }
-    by_energy = {
-        _title(mesh, of): {
-            name: (_drawn(found)["switched"], _drawn(found)["max_lsb"])
-            for name, found in of.items()
-            if _counts(name)
-        }
-        for mesh, of in of_mesh.items()
-    }
-    middle = list(of_mesh)[min(1, len(of_mesh) - 1)]
-    by_lights = {
-        f"{lights} light{'s' * (lights > 1)}": {
-            name: (area_of(of[name]) * _drawn(found)["cycles"], _drawn(found)["max_lsb"])
-            for name, found in of_mesh[middle].items()
-            if area_of(of[name])
-        }
-        for lights, of in of_lights.items()
-    }
-    x = "area times time, bits of adders times cycles a pixel"
-    note = f"Exponent {DRAWN}. The line is the front of the methods that draw Blinn's highlight. "
-    partly = "`kuijk-blake` counts only the multipliers of its setup, so its area is a lower bound. "
-    return [
-        _drawing("rivals-area", "Error against area times time, by mesh", x, by_area, note + partly),
-        _drawing(
-            "rivals-lights",
-            "Error against area times time, by number of lights",
-            x,
-            by_lights,
-            f"{note}{partly}Mesh: {_title(middle, of_mesh[middle])}. Errors are those of one light.",
-        ),
-        _drawing(
-            "rivals-energy",
-            "Error against switched bits, by mesh",
-            "switched bits a pixel",
-            by_energy,
-            f"{note}Every method gives one pixel a cycle, or waits without switching. `kuijk-blake` is left "
-            "out, because the switched bits of its setup are not counted.",
-        ),
-    ]
-
-
-_STYLES = {
-    "duff": ("#7a4fbf", "p"),
-    "bishop-weimer": ("#999933", "v"),
-    "bishop-weimer-six": ("#999933", "^"),
-    "loisel": ("#cc6677", "X"),
-    "abbas": ("#44aa99", "P"),
-}
-"""Colours and markers of the rivals without hardware."""
-
-
-def _style(name: str) -> tuple[str, str]:
-    """Colour and marker of a method."""
-    style = style_of(COMPARED[name].HARDWARE)
-    return _STYLES.get(name, (style.color, style.marker))
-
-
-def _drawing(
-    name: str, title: str, x: str, groups: Mapping[str, Mapping[str, tuple[float, float]]], note: str
-) -> tuple[Drawing, str]:
-    """A panel for each group of points, with its front, and a sentence about the fronts."""
-    figure, axes = panels(4.6 * len(groups), 4.2, len(groups), sharey=True)
-    said = []
-    for panel, (group, points) in zip(axes, groups.items(), strict=True):
-        same = {of: at for of, at in points.items() if COMPARED[of].REFLECTION.name == "blinn"}
-        front = front_of(same)
-        said.append(f"{group}: {_listed(front) if len(front) > 1 else f'`{front[0]}`'}")
-        for of, at in points.items():
-            color, marker = _style(of)
-            shown = color if of in same else "none"
-            panel.plot(*at, marker, color=color, markerfacecolor=shown, markersize=6)
-        panel.step(*zip(*(points[of] for of in front), strict=True), where="post", color="#1c2126", lw=1.1)
-        panel.set(xscale="log", yscale="log", title=group, xlabel=x)
-        panel.margins(0.16)
-        labels = [
-            Label(*at, of, _style(of)[0], "bold" if of in front else "normal") for of, at in points.items()
-        ]
-        place_labels(panel, labels, list(points.values()))
-    axes[0].set_ylabel("largest error before rounding, LSB of linear light")
-    text = f"*{title}*: the front has, from the smallest on, for {'; for '.join(said)}."
-    return Drawing(name, title, svg(figure), note), text
+    tables = [_parts_table(of_lights), _host_table(of_lights), _errors_table(of_mesh), placed_table(of_mesh)]
+    return Section("rivals", "Rivals", text, [*tables, *(drawing for drawing, _ in drawn)])
 
 
 def _parts_table(of_lights: Mapping[int, Mapping[str, Mapping[str, Any]]]) -> Table:
@@ -453,8 +347,8 @@ def _errors_table(of_mesh: Mapping[str, Mapping[str, Sequence[Mapping[str, Any]]
     columns += [f"triangles over {SHARED_LSB} LSB, %", "cycles a pixel", "switched bits a pixel"]
     rows: list[list[Cell]] = [
         [
-            *(name, _title(mesh, found), of["exponent"], of["max_lsb"], of["pixel_lsb"]),
-            *(100 * of["share"], of["cycles"], of["switched"] if _counts(name) else None),
+            *(name, title_of(mesh, found), of["exponent"], of["max_lsb"], of["pixel_lsb"]),
+            *(100 * of["share"], of["cycles"], of["switched"] if counts(name) else None),
         ]
         for name in COMPARED
         for mesh, found in of_mesh.items()
@@ -466,8 +360,3 @@ def _errors_table(of_mesh: Mapping[str, Mapping[str, Sequence[Mapping[str, Any]]
         "visible triangles."
     )
     return Table("rivals-errors", "Errors, cycles and switched bits", columns, rows, note)
-
-
-def _counts(name: str) -> bool:
-    rival = COMPARED[name]
-    return not isinstance(rival, SpanDesign) or rival.COUNTS_SETUP

@@ -83,7 +83,12 @@ def report():
     kinds = "multiplications", "additions", "divisions", "roots", "functions"
     work = {f"{kind} a {rate}": k for rate in ("triangle", "span") for k, kind in enumerate(kinds, 1)}
     hosts = [{"method": name, "lights": 1} | work for name in names]
-    tables = {"parts": parts, "errors": errors, "host": hosts}
+    placed = [
+        {"method": name, "mesh": mesh, "tables times ns": time, "on the front of tables": name != "duff"}
+        for mesh in meshes
+        for name, time in (("quotient", 9), ("duff", 1), ("chord-local", 8))
+    ]
+    tables = {"parts": parts, "errors": errors, "host": hosts, "placed": placed}
     tables = {f"rivals-{name}": {"rows": rows} for name, rows in tables.items()}
     figures = {"points": {"figures": {"points": points}}, "rivals": {"tables": tables}}
     return {"made": "2026-11-27T10:00:00+00:00", "versions": versions, "sections": figures}
@@ -171,7 +176,9 @@ def test_table_of_rivals():
         "cycles": [1, 2],
         "switched": [None, None],
     }
-    assert found["fronts"] == {"area": [["bishop-weimer-six"]] * 2, "switched": [["bishop-weimer-six"]] * 2}
+    fronts = {"area": ["bishop-weimer-six"], "switched": ["bishop-weimer-six"]}
+    fronts["placed"] = ["chord-local", "quotient"]
+    assert found["fronts"] == {name: [front] * 2 for name, front in fronts.items()}
 
 
 def test_all_sources_of_the_paper_are_there():
