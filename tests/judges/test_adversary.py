@@ -14,25 +14,25 @@ from .adversary import Adversary
 SEED = int(os.environ.get("ADVERSARY_SEED", "1"))
 
 LARGEST = {
-    ("quotient", "blinn"): 0.53,
+    ("quotient", "blinn"): 0.56,
     ("quotient", "phong"): 0.55,
     ("quotient", "ggx"): 0.53,
-    ("quotient", "beckmann"): 0.62,
+    ("quotient", "beckmann"): 0.65,
     ("chord-local", "blinn"): 0.72,
     ("chord-local", "ggx"): 0.71,
-    ("chord-local", "beckmann"): 0.69,
+    ("chord-local", "beckmann"): 0.73,
     ("chord-local", "cosquad"): 0.70,
-    ("renormalise", "blinn"): 0.55,
-    ("renormalise", "ggx"): 0.54,
-    ("renormalise", "beckmann"): 0.63,
+    ("renormalise", "blinn"): 0.59,
+    ("renormalise", "ggx"): 0.57,
+    ("renormalise", "beckmann"): 0.68,
     ("renormalise", "exp"): 0.56,
-    ("renormalise", "blinn_product"): 0.53,
+    ("renormalise", "blinn_product"): 0.55,
     ("quadratic", "cosquad"): 1.32,
     ("angular", "cosquad"): 1.56,
-    ("recurrence", "cosquad"): 0.77,
-    ("bisection", "cosquad"): 1.51,
+    ("recurrence", "cosquad"): 1.73,
+    ("bisection", "cosquad"): 1.54,
 }
-"""Largest errors of pixels that the long search found from seed 1, in LSB, rounded up. The table of
+"""Largest errors of pixels that the long search found from seeds 1 to 4, in LSB, rounded up. The table of
 docs/guide/accuracy.md is the same."""
 
 ROUNDS = 160
