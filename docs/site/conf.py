@@ -16,6 +16,9 @@ extensions = ["myst_parser", "sphinx.ext.autodoc", "sphinx.ext.napoleon"]
 # Names in single backquotes are Python objects, as in the docstrings.
 default_role = "py:obj"
 
+# Pictures with a height, which the first page of the units has.
+myst_enable_extensions = ["html_image"]
+
 # Anchors of headings as hosts of Markdown name them.
 myst_heading_anchors = 6
 

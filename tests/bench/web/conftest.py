@@ -43,7 +43,8 @@ def documents(tmp_path_factory, board_page):
     pages, folder = tmp_path_factory.mktemp("pages"), tmp_path_factory.mktemp("documents") / "docs"
     write_pages(pages, ["dot_product"], samples=500)
     # The first page names every unit.
-    (pages / "README.md").write_text("# Units\n\n| unit |\n|---|\n| [dot_product](dot_product.md) |\n")
+    row = '| [dot_product](dot_product.md) | <img src="dot_product-structure.svg" alt="" height="90"> |'
+    (pages / "README.md").write_text(f"# Units\n\n| unit | structure |\n|---|---|\n{row}\n")
     command = [sys.executable, SCRIPTS / "make.py", folder, "--pages", pages, "--boards", board_page]
     done = subprocess.run(command, capture_output=True, text=True, check=False)
     assert (done.returncode, done.stderr) == (0, ""), done.stderr
