@@ -277,9 +277,10 @@ def simulated(
         start = perf_counter()
         rate = Fraction(plan.rates["sync"] / plan.rates["serial"])
         mode = gpu.buffer.mode
-        with words, progress(total=count, unit="frames") as bar:
+        line = mode.horizontal.total
+        with words, progress(total=count * mode.vertical.total, unit="lines") as bar:
             top = OneClock(GpuUnit(gpu), rate)
-            shown = show(top, mode, count, progress=lambda pixels: bar.update(pixels / mode.cycles - bar.n))
+            shown = show(top, mode, count, progress=lambda pixels: bar.update(pixels // line - bar.n))
         seconds = perf_counter() - start
         for path, frame in zip(paths, shown.frames, strict=True):
             write_image(path, frame)

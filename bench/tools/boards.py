@@ -129,8 +129,8 @@ BOARDS = {
             loader="icepi-zero",
             flash="spi_flash_1x",
             compact=True,
-            known="not tried with quotient so far. On commit c815b08 an earlier method gave a bitstream. The "
-            "same device on an ulx3s-25f has a bitstream of commit 2bc48e68",
+            known="made on commit 61f8a1b9 by the first placement, with 17,709 of 24,288 look-up tables and "
+            "all 56 block RAMs. All steps take 8 minutes of one core. The bitstream meets every clock",
         ),
     )
 }
