@@ -14,7 +14,14 @@ from blysk.golden.reference.scene import Scene
 from blysk.golden.rivals.rival import Rival, directions_of
 from blysk.golden.rivals.shades import Shades, shaded
 from blysk.golden.rivals.trace import Trace
-from blysk.golden.rivals.triangles import ScreenTriangles, Surfaces, at_origin, gradients, screen_triangles
+from blysk.golden.rivals.triangles import (
+    ScreenTriangles,
+    Surfaces,
+    at_origin,
+    dot,
+    gradients,
+    screen_triangles,
+)
 
 __all__ = ["Duff", "TracedQuotient", "TriangleWords"]
 
@@ -99,7 +106,7 @@ class Duff(Rival):
     word      format    why
     ========= ========= =====================================================================
     v, v x H  SQ(1, 17) multiplier operands; one factor scales a triangle
-    squares   SQ(3, 47) ``|v|^2`` under 3; differences are cut to 13 bits below the products
+    squares   SQ(3, 47) ``|v|^2`` under 2; differences are cut to 13 bits below the products
     lines     SQ(2, 36) as for the quotient method
     ========= ========= =====================================================================
 
@@ -113,6 +120,8 @@ class Duff(Rival):
     SQUARES: ClassVar[Surfaces] = Surfaces(SQ(3, 47))
     LOWEST: ClassVar[int] = -2
     """Least exponent of a step. A step of four widths of the word only occurs in slivers."""
+    LARGEST: ClassVar[float] = 1.99
+    """Largest ``|v|^2`` of a corner."""
 
     def host(self, scene: Scene, triangles: ScreenTriangles) -> list[np.ndarray]:
         """Planes of v and ``v x H``, scaled: three arrays of shape (components, triangles)."""
@@ -127,6 +136,9 @@ class Duff(Rival):
             vectors.append(np.concatenate(components))
         largest = np.max([np.abs(np.asarray(of)).max(axis=0) for of in vectors], axis=0)
         scale = (1 - MARGIN * 2.0**-17) / largest
+        # A pixel's word of |v|^2 - |v x H|^2 is under 2, and |v|^2 may be 3.
+        square = np.max([np.asarray(dot(of, of)) for of in corners], axis=0) * scale * scale
+        scale = scale * np.where(square > self.LARGEST, 0.8, 1.0)
         return list(at_origin(np.stack([of * scale for of in vectors]), gradients(triangles)))
 
     def beat_bits(self, lights: int) -> int:

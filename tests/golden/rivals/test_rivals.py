@@ -12,6 +12,7 @@ from blysk.golden.lighting.intensity import Intensity
 from blysk.golden.lighting.lobe import Lobe
 from blysk.golden.number.fixed import SQ, UQ, Fixed
 from blysk.golden.reference.fragments import fragment_normals
+from blysk.golden.reference.geometry import normalise
 from blysk.golden.reference.light import Light
 from blysk.golden.reference.lighting import halfway_vector
 from blysk.golden.reference.raster import rasterise
@@ -73,6 +74,16 @@ def test_duff_is_exact_up_to_its_words(lights):
     np.testing.assert_allclose(pixels.line.values / np.sqrt(square), cosine, atol=4e-5)
     np.testing.assert_allclose(pixels.numerator.values / square, u * (2 - u), atol=6e-5)
     assert (pixels.away == (u > 1)).all()
+    assert _errors(Duff(), scene) < 0.15
+
+
+def test_duff_keeps_highlights_whose_half_way_vector_has_three_equal_components():
+    """There ``|v|^2`` would be up to 3 if only the components had to fit. The word of a pixel is under 2."""
+    scene = small_scene(lights=1)
+    viewer, halfway = scene.camera.viewer, np.ones(3) / np.sqrt(3)
+    towards = 2 * (halfway @ viewer) * halfway - viewer
+    normals = normalise(halfway + 0.05 * scene.mesh.normals)
+    scene = replace(scene, mesh=replace(scene.mesh, normals=normals), lights=[Light(tuple(towards))])
     assert _errors(Duff(), scene) < 0.15
 
 
