@@ -19,6 +19,7 @@ from blysk.bench.tools.boards import Board, packages_missing
 from blysk.bench.tools.families import ECP5, signal_name
 from blysk.bench.tools.kept_builds import KeptBuild
 from blysk.bench.tools.memory_map import MemoryMap, ScenePatterns, blocks_of_netlist, carrying, memory_words
+from blysk.bench.tools.nextpnr import CROWDED, is_crowded, run_nextpnr
 from blysk.bench.tools.place_and_route import MAP_AFTER, MAP_BEFORE, YOSYS, versions_of
 from blysk.bench.tools.tool_runner import MOUNT, GivenUp, TooLarge, ToolError, ToolRunner, Watch
 from blysk.hdl.core.scene_memory import contents_from
@@ -202,14 +203,14 @@ def _script(draw: float) -> str:
 
 
 def _stuck(said: str) -> str:
-    """Reason why the router will not end, from its log. Empty while it may end.
+    """Reason why placer or router will not end, from their log. Empty while they may end.
 
     In all runs that ended, the number of wires used twice at least halved while the rounds doubled.
     """
     twice = [int(number) for number in re.findall(r"^Info:\s+iter=\d+ wires=\d+ overused=(\d+)", said, re.M)]
     if len(twice) >= _ROUNDS and twice[-1] >= _FEW and 2 * min(twice) > twice[len(twice) // 2]:
         return f"{min(twice)} wires are used twice at best in {len(twice)} rounds"
-    return ""
+    return CROWDED if is_crowded(said) else ""
 
 
 def _nextpnr(name: str) -> str:
@@ -381,8 +382,7 @@ def _place(
         *("--report", f"{MOUNT}/{seed}.json", "--seed", str(seed), "--timing-allow-fail"),
     ]
     try:
-        watch = Watch(f"placement {seed}", tell, _stuck)
-        runner.run("nextpnr", _nextpnr("nextpnr_ecp5"), options, folder, watch=watch)
+        run_nextpnr(runner, _nextpnr("nextpnr_ecp5"), options, folder, f"placement {seed}", tell, _stuck)
     except GivenUp as error:
         (folder / given_up).write_text(str(error), encoding="utf-8")
         kept.keep(folder, given_up)

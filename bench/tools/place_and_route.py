@@ -22,7 +22,8 @@ from blysk.bench.tools.absorb_registers import Absorbed, absorb_registers, text_
 from blysk.bench.tools.defaults import SEEDS
 from blysk.bench.tools.families import ECP5, Family, Parts, Place, kind_of_cell, signal_name
 from blysk.bench.tools.kept_builds import KeptBuild
-from blysk.bench.tools.tool_runner import MOUNT, GivenUp, TooLarge, ToolError, ToolRunner, Watch
+from blysk.bench.tools.nextpnr import CROWDED, SLOW, is_crowded, is_slow, run_nextpnr
+from blysk.bench.tools.tool_runner import MOUNT, TooLarge, ToolError, ToolRunner, Watch
 from blysk.sim.engines.cache import cache_folder, version_of
 from blysk.sim.errors import InputError
 from blysk.sim.installation import install_extra
@@ -61,25 +62,6 @@ MAP_AFTER = """
 write_json netlist.json"""
 
 YOSYS = "import sys, pyosys.libyosys as y; d = y.Design(); [d.run_pass(l.strip()) for l in sys.stdin]"
-
-_SLACK = re.compile(r"ripped up due to negative slack WNS=(-?[\d.]+)ns")
-_ROUNDS = 10
-"""Rounds of the router for paths that are too slow.
-
-Within these rounds the slowest path must become faster.
-"""
-
-_OVERLAP = re.compile(r"^Info: overlap: COMB=([\d.]+)%, FF=([\d.]+)%", re.MULTILINE)
-_SPREAD, _ROUNDS_SPREAD = 5, 200
-"""Percentage of overlapping logic cells, and rounds of the static placer.
-
-If fewer logic cells overlap in all of the last rounds, then the placer does not end.
-"""
-
-_SLOW = f"no faster in {_ROUNDS} rounds"
-_CROWDED = f"block RAMs or multipliers overlap after {_ROUNDS_SPREAD} rounds"
-_LEFT_OUT = {_SLOW: ("--tmg-ripup",), _CROWDED: ("--placer", "static")}
-"""Options that are left out when nextpnr is run again, by the reason for which it was given up."""
 
 _LARGE = 1000
 """Least number of look-up tables of a large design."""
@@ -322,21 +304,8 @@ def _store(path: Path, parts: Parts, place: Place) -> None:
 
 
 def _stuck(said: str) -> str:
-    """Reason why nextpnr will not end, from its log, a key of `_LEFT_OUT`. Empty if it may end.
-
-    nextpnr routes wires of slow paths again as long as there are slow paths. If the target cannot be met,
-    nextpnr does not end. For example, the bisection's slowest path stayed the same to 10 ps in 27 rounds.
-
-    The static placer goes on until no kind of cell overlaps. With 20 block RAMs, 4 of them overlapped in 300
-    rounds after all else had found its place. Placements that ended did so with 10 % of overlapping logic.
-    """
-    slack = [float(worst) for worst in _SLACK.findall(said)]
-    if len(slack) > _ROUNDS and max(slack[-_ROUNDS:]) <= max(slack[:-_ROUNDS]):
-        return _SLOW
-    overlaps = [max(map(float, found)) for found in _OVERLAP.findall(said)]
-    if len(overlaps) > _ROUNDS_SPREAD and max(overlaps[-_ROUNDS_SPREAD:]) < _SPREAD:
-        return _CROWDED
-    return ""
+    """Reason why nextpnr will not end, from its log: `SLOW` or `CROWDED`. Empty if it may end."""
+    return SLOW if is_slow(said) else CROWDED if is_crowded(said) else ""
 
 
 def lay_out(
@@ -464,22 +433,15 @@ def _run(
                 path = folder / f"{seed}.json"
                 files = ["--json", f"{MOUNT}/top.json", "--report", f"{MOUNT}/{path.name}"]
                 arguments = [*options, *files, "--seed", str(seed)]
-                given_up: list[str] = []
-                while True:
-                    watch = Watch("; ".join([f"seed {seed}", *given_up]), tell, _stuck)
-                    try:
-                        runner.run("nextpnr", nextpnr, arguments, folder, watch=watch)
-                        break
-                    except GivenUp as error:
-                        given_up.append(str(error))
-                        arguments = [option for option in arguments if option not in _LEFT_OUT[str(error)]]
-                    except ToolError as error:
-                        if "legal placement" in str(error):
-                            raise TooLarge(f"does not fit: from seed {seed} {error}") from None
-                        raise
+                try:
+                    given_up = run_nextpnr(runner, nextpnr, arguments, folder, f"seed {seed}", tell, _stuck)
+                except ToolError as error:
+                    if "legal placement" in str(error):
+                        raise TooLarge(f"does not fit: from seed {seed} {error}") from None
+                    raise
                 report = json.loads(path.read_text(encoding="utf-8"))
                 place = read_report(report, seed, family, absorbed.closed)
-                place = replace(place, rerouted=_SLOW in given_up, default_placer=_CROWDED in given_up)
+                place = replace(place, rerouted=SLOW in given_up, default_placer=CROWDED in given_up)
                 return seed, (parts_of(mapped, report, family), place)
 
             waiting = [pool.submit(route, seed) for seed in seeds]

@@ -15,11 +15,12 @@ from amaranth.lib.memory import Memory
 from PIL import Image
 
 from blysk.bench.tools.board import built_lines, design_lines, missed, planned
-from blysk.bench.tools.board_build import Built, Clock, _stuck, build, refuse_too_large
+from blysk.bench.tools.board_build import Built, Clock, _place, _stuck, build, refuse_too_large
 from blysk.bench.tools.board_design import BoardTop, _free_blocks, gpu_of
 from blysk.bench.tools.boards import BOARDS
+from blysk.bench.tools.kept_builds import KeptBuild
 from blysk.bench.tools.place_and_route import tool_versions
-from blysk.bench.tools.tool_runner import TooLarge, ToolError
+from blysk.bench.tools.tool_runner import GivenUp, TooLarge, ToolError, ToolRunner
 from blysk.golden.albedo.attribute_spans import AttributeSpans
 from blysk.golden.reference.light import Light
 from blysk.golden.video.band_buffer import RGB888, BandBuffer
@@ -279,6 +280,21 @@ def test_a_router_that_will_not_end_is_given_up(twice, says):
     # Messages of the placer about its own rounds, and a line that has just begun.
     assert _stuck(f"Info: iter=595 steplen=1.296256 a=299.9\n{said}Info:     iter=") == says
     assert _stuck("") == ""
+
+
+def test_a_static_placer_that_will_not_end_is_replaced(monkeypatch, tmp_path):
+    """Block RAMs overlap for ever. The placement is then made by the default placer, and kept."""
+    given = []
+
+    def talks(self, name, code, arguments, folder, text="", watch=None):
+        given.append("static" in arguments)
+        said = "Info: overlap: COMB=0.2%, FF=0.1%, RAM=20.0%, MUL=0.0%\n" * 201
+        if given[-1] and (reason := watch(said)):
+            raise GivenUp(reason)
+
+    monkeypatch.setattr(ToolRunner, "run", talks)
+    _place(BOARDS["ulx3s-25f"], ToolRunner(), tmp_path, 3, KeptBuild(("a design",)), lambda line: None)
+    assert given == [True, False]
 
 
 @pytest.mark.parametrize("name", BOARDS)
