@@ -1,20 +1,33 @@
 """Triangle assembly: the triangles in a band, from ranges of the mesh memory and screen vertices."""
 
-from amaranth.hdl import Array, Module, Mux, Signal, Value, signed, unsigned
+from itertools import pairwise
+
+from amaranth.hdl import Array, Cat, Const, Module, Mux, Signal, Value, signed, unsigned
 from amaranth.lib import data, stream, wiring
 from amaranth.lib.memory import Memory
 from amaranth.lib.wiring import In, Out
 
 from blysk.golden.geometry.edge_setup import X_BITS
 from blysk.golden.geometry.triangles import MATERIAL_BITS
+from blysk.golden.video.mesh_memory import BLOCK_BITS
 from blysk.golden.video.triangle_assembly import COUNTERS, TriangleAssembly
+from blysk.hdl.core.memory import read_domain, word_in_register
 from blysk.hdl.core.scene_memory import scene_memory, word_write_shape, write_words
-from blysk.hdl.core.views import copy
+from blysk.hdl.core.views import copy, copy_fields
 from blysk.hdl.geometry.triangles import count_events, counters_shape, first_centre, triangle_shape
 from blysk.hdl.video.mesh_memory import range_shape
 from blysk.hdl.video.vertex_unit import screen_vertex_shape
 
-__all__ = ["TriangleAssemblyUnit", "band_rows_shape", "draw_shape"]
+__all__ = ["FIRST_BITS", "TriangleAssemblyUnit", "band_rows_shape", "draw_shape"]
+
+FIRST_BITS = 2 * BLOCK_BITS
+"""Bits of a screen vertex that are read first: its place, its depth, and some bits of its normal.
+
+The other bits are read two cycles later, from a memory of their own. They arrive when it is known whether the
+triangle is in the band. So they need no further registers, and are as many block RAMs as in a single memory.
+"""
+
+_OF_TRIANGLE = "material", "base", "range"
 
 
 def draw_shape() -> data.StructLayout:
@@ -91,23 +104,13 @@ class TriangleAssemblyUnit(wiring.Component):
         m.submodules.triangles = triangles = scene_memory(
             "triangles", 3 * mesh.index_bits, mesh.triangle_room, mesh.triangle_words
         )
-        vertex = self.write.payload.vertex.shape()
-        m.submodules.vertices = vertices = Memory(shape=vertex.size, depth=mesh.vertex_room, init=[])
-        write, face, read = vertices.write_port(), triangles.read_port(), vertices.read_port()
-        result, valid = Signal(self.o.payload.shape(), name="result"), Signal(name="valid")
-        advance = Signal(name="advance")
+        face, valid, advance = triangles.read_port(), Signal(name="valid"), Signal(name="advance")
         m.d.comb += [
-            # Reads and writes share one address, and never come in the same cycle. If not, a block RAM would
-            # need registers beside it, or give words of half its width.
-            write.addr.eq(read.addr),
-            write.data.eq(Value.cast(self.write.payload.vertex)),
-            write.en.eq(self.write.valid),
             self.write.ready.eq(1),
             # A skid buffer would cost 400 bits without a gain, because the next unit takes at least 5 cycles
             # for a triangle.
             advance.eq(~valid | self.o.ready),
             self.o.valid.eq(valid),
-            copy(self.o.payload, result),
         ]
 
         # A triangle's word is read a cycle before the address of its first corner, and kept for three cycles.
@@ -123,14 +126,6 @@ class TriangleAssemblyUnit(wiring.Component):
         m.d.comb += [
             self.i.ready.eq(rests),
             face.en.eq(reads),
-            read.addr.eq(
-                Mux(
-                    self.write.valid,
-                    self.write.payload.index,
-                    Array(face.data.word_select(k, mesh.index_bits) for k in range(3))[corner],
-                )
-            ),
-            read.en.eq(advance & ~self.write.valid),
         ]
         with m.If(self.i.ready), m.If(self.i.valid):
             given = self.i.payload
@@ -142,17 +137,53 @@ class TriangleAssemblyUnit(wiring.Component):
                     m.d.sync += [left.eq(left - 1), following.eq(following + 1)]
             with m.Else():
                 m.d.sync += corner.eq(corner + 1)
-        found = self._gather(m, advance, walks, corner, data.View(vertex, read.data), material)
-        self._judge(m, advance, found, result, valid)
+        found = self._gather(m, advance, walks, corner, face.data, material)
+        self._judge(m, advance, found, valid)
         inside = walks | (left != 0) | found["inside"] | found["whole"] | found["valid"] | valid
         m.d.comb += self.idle.eq(~inside)
         return m
 
-    def _gather(self, m: Module, advance, walks, corner, word, material) -> dict:
+    def _memory(self, m: Module, name: str, word: Value, advance: Value, index: Value) -> Signal:
+        """A memory of a part of each vertex, and the register of the part that was read last."""
+        write = self.write
+        m.submodules[name] = memory = Memory(shape=len(word), depth=self.model.mesh.vertex_room, init=[])
+        port, read, reads = memory.write_port(), memory.read_port(domain=read_domain()), Signal()
+        m.d.comb += [
+            # Reads and writes share one address, and never come in the same cycle. If not, a block RAM would
+            # need registers beside it, or give words of half its width. Yosys sees this from the enable of a
+            # register, and not from the enable of a port.
+            reads.eq(advance & ~write.valid),
+            read.addr.eq(Mux(write.valid, write.payload.index, index)),
+            port.addr.eq(read.addr),
+            port.data.eq(word),
+            port.en.eq(write.valid),
+        ]
+
+        def register(value):
+            kept = Signal.like(value, name=f"{name}_read", reset_less=True)
+            with m.If(reads):
+                m.d.sync += kept.eq(value)
+            return kept
+
+        return word_in_register(m, read, reads, register)
+
+    def _gather(self, m: Module, advance, walks, corner, face, material) -> dict:
         """Shift corners in. Find the range of their scanlines, and whether a corner is outside."""
-        grid = self.model.grid
+        grid, mesh, given = self.model.grid, self.model.mesh, self.write.payload.vertex
+        # The first bits tell whether the triangle is in the band. The last bits come when this is known.
+        names = "outside", *(name for name in given.shape().members if name != "outside")
+        vertex = data.StructLayout({name: given.shape().members[name] for name in names})
+        words = Cat(Value.cast(given[name]) for name in names)
+        index = Array(face.word_select(k, mesh.index_bits) for k in range(3))[corner]
+        indices = [index, *(Signal(mesh.index_bits, name=f"index_{k}", reset_less=True) for k in (1, 2))]
+        with m.If(advance):
+            m.d.sync += [later.eq(sooner) for sooner, later in pairwise(indices)]
+        first_bits = self._memory(m, "vertices", words[:FIRST_BITS], advance, index)
+        last_bits = self._memory(m, "vertices_last", words[FIRST_BITS:], advance, indices[2])
+        word = data.View(vertex, Cat(first_bits, Const(0, vertex.size - FIRST_BITS)))
         arrives, arriving = Signal(name="arrives"), Signal(2, name="arriving")
-        corners = [Signal(word.shape(), name=f"corner_{k}") for k in range(3)]
+        corners = [Signal(FIRST_BITS, name=f"corner_{k}", reset_less=True) for k in range(3)]
+        lasts = [Signal(len(last_bits), name=f"last_bits_{k}", reset_less=True) for k in range(3)]
         low, high = (Signal(signed(X_BITS), name=name) for name in ("low", "high"))
         outside, whole = Signal(name="outside"), Signal(name="whole")
         kept = Signal.like(material, name="material_of_corners")
@@ -162,15 +193,17 @@ class TriangleAssemblyUnit(wiring.Component):
             Signal(name="came"),
             Signal(name="judged"),
         )
+        comes_last = Signal(name="comes_last")
         first, first_row, was_outside = arriving == 0, Signal(name="first_row"), Signal(name="was_outside")
         with m.If(advance):
             m.d.sync += [arrives.eq(walks), arriving.eq(corner), whole.eq(arrives & (arriving == 2))]
             m.d.sync += [came.eq(arrives), first_row.eq(first), judged.eq(whole), was_outside.eq(outside)]
+            m.d.sync += comes_last.eq(came)
+            with m.If(comes_last):
+                m.d.sync += [to.eq(behind) for to, behind in pairwise([*lasts, last_bits])]
             with m.If(arrives):
                 m.d.sync += [
-                    copy(corners[0], corners[1]),
-                    copy(corners[1], corners[2]),
-                    copy(corners[2], word),
+                    *(to.eq(behind) for to, behind in pairwise([*corners, first_bits])),
                     row.eq(first_centre(word.y, grid)),
                     outside.eq(word.outside | (outside & ~first)),
                 ]
@@ -183,6 +216,8 @@ class TriangleAssemblyUnit(wiring.Component):
                 ]
         return {
             "corners": corners,
+            "lasts": lasts,
+            "vertex": vertex,
             "low": low,
             "high": high,
             "outside": was_outside,
@@ -192,20 +227,27 @@ class TriangleAssemblyUnit(wiring.Component):
             "material": kept,
         }
 
-    def _judge(self, m: Module, advance, found: dict, result, valid) -> None:
+    def _judge(self, m: Module, advance, found: dict, valid) -> None:
         """Give the triangle to the output, if it is in the band."""
+        kept = {name: shape for name, shape in self.o.payload.shape().members.items() if name in _OF_TRIANGLE}
+        result = Signal(data.StructLayout(kept), name="result", reset_less=True)
+        m.d.comb += copy_fields(self.o.payload, result, kept)
         band = self.constants
         low = Mux(found["low"] > band.top, found["low"], band.top)
         high = Mux(found["high"] < band.bottom, found["high"], band.bottom)
         covered = low < high
         judged, outside = found["valid"], found["outside"]
+        # The flag ``outside`` comes first, and is not kept.
+        firsts = [Signal(FIRST_BITS - 1, name=f"first_bits_{k}", reset_less=True) for k in range(3)]
+        for k, (first, last) in enumerate(zip(firsts, found["lasts"], strict=True)):
+            corner = data.View(found["vertex"], Cat(Const(0, 1), first, last))
+            names = [name for name in found["vertex"].members if name != "outside"]
+            m.d.comb += [copy(self.o.payload[name][k], corner[name]) for name in names]
         with m.If(advance):
             m.d.sync += valid.eq(judged & covered & ~outside)
             # All corners are there a cycle before the test of the band has a result.
             with m.If(found["whole"]):
-                names = [name for name in found["corners"][0].shape().members if name != "outside"]
-                for k, corner in enumerate(found["corners"]):
-                    m.d.sync += [copy(result[name][k], corner[name]) for name in names]
+                m.d.sync += [to.eq(corner[1:]) for to, corner in zip(firsts, found["corners"], strict=True)]
                 m.d.sync += result.material.eq(found["material"])
                 if (placement := self.model.mesh.placement) is not None:
                     for to, codes in zip((*result.base, result.range), placement.T.tolist(), strict=True):

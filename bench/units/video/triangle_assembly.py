@@ -73,7 +73,6 @@ RECORD = Record(
         "a counter has room for more events than a run has": (
             "count_sent[9-31] count_rejected[7-31] count_outside[7-31]"
         ),
-        "no triangle in the memory is two-sided": "result[418]",
     },
     remembers=True,
 )
