@@ -216,7 +216,7 @@ class ShadingPipelineUnit(wiring.Component):
         """The albedo path, and the times that follow from it."""
         p, shading = self.model, self._shading
         interval = COMPACT_INTERVAL if p.build.compact else 1
-        self._albedo = AlbedoUnit(p.albedo, p.length_bits, interval)
+        self._albedo = AlbedoUnit(p.albedo, p.length_bits, interval, spaced=self._spacing >= SPACED)
         behind = shading.latency - shading.light_latency + self._assembler.latency
         before = self.latency - behind if p.lights else 0
         path = SLICE_LATENCY + self._albedo.latency + LATE_FIFO_LATENCY

@@ -82,6 +82,8 @@ class AlbedoUnit(wiring.Component):
         Cycles from a pixel to the next.
     waiting : int
         Largest number of samples under way to a texel memory outside, at least 4.
+    spaced : bool
+        As in `AttributeSpansUnit`.
 
     Members
     -------
@@ -99,7 +101,8 @@ class AlbedoUnit(wiring.Component):
     Attributes
     ----------
     latency : int
-        Cycles from a span to its first pixel. A texel memory outside adds its own latency.
+        Cycles from a span to its first pixel. A texel memory outside adds its own latency. With ``spaced`` a
+        step may add to them.
 
     Source: docs/theory/textures.md.
     """
@@ -110,10 +113,11 @@ class AlbedoUnit(wiring.Component):
         length_bits: int = LENGTH_BITS,
         initiation_interval: int = 1,
         waiting: int = 16,
+        spaced: bool = False,
     ):
         self.model = p = model or Albedo()
         self.initiation_interval = initiation_interval
-        self._spans = AttributeSpansUnit(p.spans, length_bits)
+        self._spans = AttributeSpansUnit(p.spans, length_bits, spaced)
         self._attributes = AttributesUnit(p.attributes, initiation_interval)
         self._sampler = self._product = None
         members = {

@@ -3,7 +3,7 @@
 from collections.abc import Iterator
 from typing import ClassVar
 
-from amaranth.hdl import Cat, Const, Module, Signal, Value, signed, unsigned
+from amaranth.hdl import Cat, Const, Module, Mux, Signal, Value, signed, unsigned
 from amaranth.lib import data, stream, wiring
 from amaranth.lib.wiring import In, Out
 
@@ -11,7 +11,7 @@ from blysk.golden.albedo.attribute_spans import AttributeSpans
 from blysk.golden.number.spans import LENGTH_BITS
 from blysk.hdl.core.fixed import FixedShape
 from blysk.hdl.core.stream import count_down, skid_buffer
-from blysk.hdl.core.views import copy_fields
+from blysk.hdl.core.views import copy, copy_fields
 
 __all__ = [
     "AttributeSpansUnit",
@@ -95,12 +95,17 @@ class AttributeSpansUnit(wiring.Component):
     cycle, unless the output waits. A span of m pixels is accepted m cycles after the span before it, also if
     m is 1. A span of length 0 takes a cycle and gives nothing. The unit has no multipliers.
 
+    If spans are *spaced*, a step is shifted by one place a cycle in place of a shifter, and there is no skid
+    buffer. The first pixel of a span of several pixels is offered as many cycles later as its exponent tells.
+
     Parameters
     ----------
     model : AttributeSpans
         Bit-accurate model.
     length_bits : int
         Bits of the length.
+    spaced : bool
+        Whether spans are spaced.
 
     Members
     -------
@@ -116,8 +121,10 @@ class AttributeSpansUnit(wiring.Component):
 
     FORMULAS: ClassVar[dict[str, str]] = {r"(\w+)_sum": "U + i·dU", r"(\w+)_step": "dU·2^(−e)"}
 
-    def __init__(self, model: AttributeSpans | None = None, length_bits: int = LENGTH_BITS):
-        self.model, self.length_bits = model or AttributeSpans(), length_bits
+    def __init__(
+        self, model: AttributeSpans | None = None, length_bits: int = LENGTH_BITS, spaced: bool = False
+    ):
+        self.model, self.length_bits, self.spaced = model or AttributeSpans(), length_bits, spaced
         p = self.model
         super().__init__(
             {
@@ -133,22 +140,38 @@ class AttributeSpansUnit(wiring.Component):
         advance = Signal()
         active, ends = count_down(m, self.i.valid, span.length, advance)
         words = Signal(self.o.payload.shape())
-        m.d.comb += [
-            advance.eq(skid_buffer(m, self.o, active, words)),
-            self.i.ready.eq(advance & ends),
-        ]
-        free = p.SUM_FORMAT.fraction_bits - p.WORD_FORMAT.fraction_bits
+        places = Signal.like(span.exponent, name="places")
+        if self.spaced:
+            settled = ends | ~places.any()
+            m.d.comb += [
+                self.o.valid.eq(active & settled),
+                copy(self.o.payload, words),
+                advance.eq(~active | (settled & self.o.ready)),
+            ]
+        else:
+            m.d.comb += advance.eq(skid_buffer(m, self.o, active, words))
+        m.d.comb += self.i.ready.eq(advance & ends)
+        free, begins = p.SUM_FORMAT.fraction_bits - p.WORD_FORMAT.fraction_bits, advance & ends
+        if self.spaced:
+            with m.If(begins):
+                m.d.sync += places.eq(span.exponent)
+            with m.Elif(places.any()):
+                m.d.sync += places.eq(places - 1)
         lines = (self._words(view) for view in (span.start, span.step, words))
         for (name, start), (_, step), (_, word) in zip(*lines, strict=True):
             total = Signal(p.SUM_FORMAT.width, name=f"{name}_sum", reset_less=True)
             difference = Signal(signed(p.SUM_FORMAT.width), name=f"{name}_step", reset_less=True)
+            given = Cat(Const(0, free), step).as_signed()
+            if self.spaced:
+                given = Mux(begins, given, difference >> 1)
+                with m.If(begins | places.any()):
+                    m.d.sync += difference.eq(given)
             with m.If(advance):
                 with m.If(ends):
                     half = Const(1 << (free - 1), free)
-                    m.d.sync += [
-                        total.eq(Cat(half, start)),
-                        difference.eq(Cat(Const(0, free), step).as_signed() >> span.exponent),
-                    ]
+                    m.d.sync += total.eq(Cat(half, start))
+                    if not self.spaced:
+                        m.d.sync += difference.eq(given >> span.exponent)
                 with m.Else():
                     m.d.sync += total.eq(total + difference)
             m.d.comb += word.eq(total[free:])

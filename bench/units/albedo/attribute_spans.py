@@ -136,6 +136,11 @@ def _long_spans(unit, rng, count):
     return Case(beats)
 
 
+def _pace(unit):
+    """A pixel a cycle. In spaced spans a pixel may wait for the shift of its step."""
+    return None if unit.spaced else 1
+
+
 def _measure(rng, count, model):
     """Words of pixels in steps of 2^-23, against straight lines between exact scaled values at the ends."""
     length = log_lengths(rng, max(count // 450, 16))
@@ -179,12 +184,13 @@ RECORD = Record(
         "both, orthographic": Variant(
             partial(AttributeSpansUnit, AttributeSpans(coordinates=True, perspective=False)), long=True
         ),
+        "colours, spaced": Variant(partial(AttributeSpansUnit, AttributeSpans(), spaced=True), long=True),
     },
     expect=_expect,
     stimuli={
-        "spans": Stimulus(_spans, 2000, pace=lambda unit: 1),
+        "spans": Stimulus(_spans, 2000, pace=_pace),
         "words": Stimulus(_words, 400),
-        "long spans": Stimulus(_long_spans, stalled=False, pace=lambda unit: 1),
+        "long spans": Stimulus(_long_spans, stalled=False, pace=_pace),
     },
     axis="pixels of the span",
     logarithmic=True,
