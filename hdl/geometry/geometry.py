@@ -13,6 +13,7 @@ from blysk.golden.geometry.span_halver import SpanHalver
 from blysk.golden.geometry.triangles import ATTRIBUTES
 from blysk.golden.geometry.vector_adapter import VectorAdapter
 from blysk.hdl.core.memory import LUT_WORDS, UNCOUNTED, connect_late_fifo
+from blysk.hdl.core.ring import next_turn
 from blysk.hdl.core.single_register import connect_register, hold_output
 from blysk.hdl.core.stream import connect, moving
 from blysk.hdl.core.views import copy, copy_fields
@@ -29,7 +30,7 @@ from blysk.hdl.geometry.span_adapter import LineAdapterUnit, line_spans_shape
 from blysk.hdl.geometry.span_attributes import SpanAttributesUnit
 from blysk.hdl.geometry.span_clip import SpanClipUnit
 from blysk.hdl.geometry.span_halver import SpanHalverUnit
-from blysk.hdl.geometry.surface_words import attribute_count, next_turn, placement_of
+from blysk.hdl.geometry.surface_words import attribute_count, placement_of
 from blysk.hdl.geometry.triangles import counters_shape, frame_shape, triangle_shape
 from blysk.hdl.geometry.vector_adapter import VectorAdapterUnit, vector_spans_shape
 from blysk.hdl.geometry.vertex_sort import VertexSortUnit, sorted_triangle_shape
@@ -104,6 +105,7 @@ class _TriangleSetup(wiring.Component):
                 "planes": Out(stream.Signature(plane_shape() if compact else planes_shape(self._count))),
                 "constants": In(frame_shape()),
                 "sliver": Out(1),
+                **({"again": In(1)} if compact else {}),
             }
         )
 
@@ -158,6 +160,8 @@ class _TriangleSetup(wiring.Component):
         m.d.sync += self.sliver.eq(scales.ready & scales.payload.sliver)
         connect(m, self._gradients.o, self._assembler.i)
         connect(m, self._assembler.o, wiring.flipped(self.planes))
+        if self._compact:
+            m.d.comb += self._assembler.again.eq(self.again)
         return m
 
 
@@ -277,6 +281,10 @@ class GeometryUnit(wiring.Component):
         for unit in (self._sort, self._walk, self._clip, *self._lanes):
             m.d.comb += copy(unit.constants, self.constants)
         connect(m, wiring.flipped(self.i), self._sort.i)
+        if self.compact:
+            # Whether the scanline is not the last of its triangle.
+            self._again = Signal(name="again")
+            m.d.comb += [lane.again.eq(self._again) for lane in self._lanes]
         walks, planes = self._set_up(m)
         connect(m, walks, self._walk.i)
         connect(m, self._walk.o, self._clip.i)
@@ -314,7 +322,8 @@ class GeometryUnit(wiring.Component):
             sources = [getattr(lane, name) for lane in lanes]
             joined = _between(name, sources[0])
             serial = self.compact and name == "planes"
-            turn = _turns(m, name, joined, len(lanes), ATTRIBUTES if serial else 1)
+            last = ~self._again if serial else None
+            turn = _turns(m, name, joined, len(lanes), ATTRIBUTES if serial else 1, last)
             m.d.comb += [
                 joined.valid.eq(Array(source.valid for source in sources)[turn]),
                 Value.cast(joined.payload).eq(Array(Value.cast(source.payload) for source in sources)[turn]),
@@ -349,18 +358,16 @@ class GeometryUnit(wiring.Component):
             m.d.comb += clipped.ready.eq(free)
             with m.If(free):
                 m.d.sync += [full.eq(clipped.valid), row.eq(clipped.payload)]
-            first = Signal(name="first", init=1)
-            with m.If(rows.valid & rows.ready):
-                m.d.sync += first.eq(rows.payload.last)
             count = attribute_count(self._surface)
             lane = Signal(range(count), name="lane")
             with m.If(to.valid & to.ready):
                 m.d.sync += lane.eq(next_turn(lane, count))
             m.d.comb += [
                 copy(to.payload.planes, planes.payload),
-                to.valid.eq(rows.valid & (planes.valid | ~first)),
-                rows.ready.eq(to.ready & (planes.valid | ~first) & (lane == count - 1)),
-                planes.ready.eq(to.ready & rows.valid & first),
+                to.valid.eq(rows.valid & planes.valid),
+                rows.ready.eq(to.ready & planes.valid & (lane == count - 1)),
+                planes.ready.eq(to.ready & rows.valid),
+                self._again.eq(~rows.payload.last),
             ]
         else:
             # The planes leave a cycle before the scanline, so that their place is free for the next planes.
@@ -417,10 +424,16 @@ def _between(name: str, port: stream.Interface) -> stream.Interface:
     return stream.Signature(port.payload.shape()).create(path=(name,))
 
 
-def _turns(m: Module, name: str, moving: stream.Interface, count: int, each: int = 1) -> Signal:
-    """Index of the lane whose turn it is. The next lane follows after ``each`` payloads, a power of two."""
+def _turns(
+    m: Module, name: str, moving: stream.Interface, count: int, each: int = 1, counts: Value | None = None
+) -> Signal:
+    """Index of the lane whose turn it is. The next lane follows after ``each`` payloads, a power of two.
+
+    If ``counts`` is given, other payloads do not count.
+    """
     passed = Signal(range(count * each), name=f"turn_of_{name}")
-    with m.If(moving.valid & moving.ready):
+    moves = moving.valid & moving.ready
+    with m.If(moves if counts is None else moves & counts):
         m.d.sync += passed.eq(passed + 1)
     return passed[each.bit_length() - 1 :]
 

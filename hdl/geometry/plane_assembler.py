@@ -1,7 +1,8 @@
 """Plane assembler: the gradients of a triangle's attributes, and the longest piece of its spans."""
 
-from amaranth.hdl import Cat, Module, Mux, Signal, Value, unsigned
+from amaranth.hdl import Cat, Const, Module, Mux, Signal, Value, unsigned
 from amaranth.lib import data, stream, wiring
+from amaranth.lib.memory import Memory
 from amaranth.lib.wiring import In, Out
 
 from blysk.golden.geometry.attribute_serialiser import AttributeSerialiser
@@ -9,9 +10,10 @@ from blysk.golden.geometry.gradient_setup import GradientSetup
 from blysk.golden.geometry.plane_assembler import PlaneAssembler
 from blysk.golden.geometry.triangles import ATTRIBUTES, LIMIT_BITS
 from blysk.hdl.core.fixed import FixedShape
+from blysk.hdl.core.memory import read_address, read_options
+from blysk.hdl.core.ring import next_turn
 from blysk.hdl.core.views import copy
 from blysk.hdl.geometry.gradient_setup import gradient_shape
-from blysk.hdl.geometry.surface_words import next_turn
 from blysk.hdl.geometry.triangles import frame_shape
 
 __all__ = ["PIECE_BITS", "PlaneAssemblerUnit", "plane_shape", "planes_shape"]
@@ -46,7 +48,8 @@ class PlaneAssemblerUnit(wiring.Component):
     after the offer the first gradient of the next triangle can be taken in. So gradients that come every four
     cycles never wait. If spans are not cut, there is neither product nor search. The unit has no multipliers.
 
-    In the *serial* form the attributes of a triangle are offered one after the other.
+    In the *serial* form the attributes of a triangle are offered one after the other, once for each scanline.
+    They are in a memory, which takes the next triangle in at the same time.
 
     Parameters
     ----------
@@ -66,6 +69,12 @@ class PlaneAssemblerUnit(wiring.Component):
     constants : :py:`In(frame_shape())`
         The frame, of which the unit reads ``limit``. Constant while triangles are inside.
 
+    Attributes
+    ----------
+    again : Signal
+        Only in the serial form, driven by the parent. If it is high when the last plane is taken, the planes
+        are offered once more.
+
     Source: docs/theory/geometry.md#normals; not in the documents.
     """
 
@@ -78,44 +87,74 @@ class PlaneAssemblerUnit(wiring.Component):
                 "constants": In(frame_shape()),
             }
         )
+        if serial:
+            self.again = Signal(name="again")
 
     def elaborate(self, platform):
         """Collected words, bound times limit, sum and maximum of the sizes, and the search."""
         m = Module()
+        if self.serial:
+            self._keep(m)
+            return m
         gradient, result = self.i.payload, Signal(planes_shape(self.count), name="result")
         count, full, accept = Signal(range(self.count), name="count"), Signal(name="full"), Signal()
         m.d.comb += [self.i.ready.eq(~full), accept.eq(self.i.valid & ~full)]
-        moves, ends = self.o.valid & self.o.ready, 1
+        moves = self.o.valid & self.o.ready
         with m.If(accept):
             m.d.sync += [count.eq(next_turn(count, self.count)), full.eq(count == self.count - 1)]
-        with m.If((accept | moves) if self.serial else accept):
             for name in _WORDS:
                 words = [Value.cast(word) for word in result[name]]
                 m.d.sync += [
                     word.eq(other)
                     for word, other in zip(words, [*words[1:], Value.cast(gradient[name])], strict=True)
                 ]
-        if self.model.cuts:
-            allowed, multiplied = self._allowed(m, accept & (count == 0), gradient.least)
-            found = self._search(m, accept, count, gradient.size, allowed, multiplied, result.piece)
-        else:
-            found = 1
-            m.d.comb += result.piece.eq(PlaneAssembler.LARGEST)
+        found = self._find(m, accept, count, result.piece)
         offers = Signal(name="offers")
-        m.d.comb += self.o.valid.eq(offers)
-        if self.serial:
-            m.d.comb += [self.o.payload[name].eq(result[name][0]) for name in _WORDS]
-            m.d.comb += self.o.payload.piece.eq(result.piece)
-            given = Signal(range(self.count), name="given")
-            with m.If(moves):
-                m.d.sync += given.eq(next_turn(given, self.count))
-            ends = given == self.count - 1
-        else:
-            m.d.comb += copy(self.o.payload, result)
-        m.d.sync += offers.eq(full & found & ~(moves & ends))
-        with m.If(moves & ends):
+        m.d.comb += [self.o.valid.eq(offers), copy(self.o.payload, result)]
+        m.d.sync += offers.eq(full & found & ~moves)
+        with m.If(moves):
             m.d.sync += full.eq(0)
         return m
+
+    def _keep(self, m: Module) -> None:
+        """Keep the planes of two triangles in a memory: one is taken in while the other is offered."""
+        count, turn = (Signal(range(self.count), name=name) for name in ("count", "turn"))
+        full, offers, bank = Signal(name="full"), Signal(name="offers"), Signal(name="bank")
+        accept, swaps = self.i.valid & ~full, Signal(name="swaps")
+        piece, kept = (Signal(PIECE_BITS, name=name) for name in ("piece", "kept_piece"))
+        words = [Value.cast(self.i.payload[name]) for name in _WORDS]
+        m.submodules.planes = memory = Memory(shape=sum(map(len, words)), depth=2 << len(count), init=[])
+        write, read = memory.write_port(), memory.read_port(**read_options(memory))
+        found, moves, last = self._find(m, accept, count, piece), offers & self.o.ready, self.count - 1
+        leaves = moves & (turn == last) & ~self.again
+        following = Mux(moves, next_turn(turn, self.count), turn)
+        m.d.comb += [
+            self.i.ready.eq(~full),
+            write.addr.eq(Cat(count, bank)),
+            write.data.eq(Cat(words)),
+            write.en.eq(accept),
+            swaps.eq(full & found & (~offers | leaves)),
+            read.addr.eq(read_address(Cat(turn, ~bank), Cat(following[: len(turn)], bank ^ ~swaps))),
+            self.o.valid.eq(offers),
+            Cat(Value.cast(self.o.payload[name]) for name in _WORDS).eq(read.data),
+            self.o.payload.piece.eq(kept if self.model.cuts else piece),
+        ]
+        m.d.sync += [turn.eq(following), offers.eq(swaps | (offers & ~leaves))]
+        with m.If(accept):
+            m.d.sync += [count.eq(next_turn(count, self.count)), full.eq(count == last)]
+        with m.If(swaps):
+            m.d.sync += [full.eq(0), bank.eq(~bank)]
+            if self.model.cuts:
+                m.d.sync += kept.eq(piece)
+
+    def _find(self, m: Module, accept: Value, count: Signal, piece: Value) -> Value:
+        """Find the exponent of a piece. Returns whether it is found."""
+        if not self.model.cuts:
+            m.d.comb += piece.eq(PlaneAssembler.LARGEST)
+            return Const(1)
+        given = self.i.payload
+        allowed, multiplied = self._allowed(m, accept & (count == 0), given.least)
+        return self._search(m, accept, count, given.size, allowed, multiplied, piece)
 
     def _allowed(self, m: Module, begins: Value, least: Value) -> tuple[Signal, Value]:
         """Bound times limit, two bits of the limit a cycle, and whether the product is finished."""

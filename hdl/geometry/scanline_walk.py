@@ -9,7 +9,7 @@ from amaranth.lib import stream
 
 from blysk.golden.geometry.gradient_setup import GradientSetup
 from blysk.golden.geometry.triangles import PIXEL_BITS
-from blysk.hdl.geometry.surface_words import next_turn
+from blysk.hdl.core.ring import Ring, next_turn
 
 __all__ = ["AttributeRing", "AttributeTurns", "ScanlineWalk"]
 
@@ -102,14 +102,11 @@ class AttributeRing:
         self.value = self._next = Signal(_BITS, name=name)
         self._domain = "sync"
         if turns.serial:
+            ring = Ring(m, f"{name}_ring", _BITS, turns.count, turns.steps, turns.lane, late)
             self._next, self._domain = Signal(_BITS, name=f"{name}_next"), "comb"
-            stays = turns.late(m, self.value, f"{name}_stays") if late else self.value
-            m.d.comb += self._next.eq(stays)
-            ring = [self.value, *(Signal(_BITS, name=f"{name}_{k}") for k in range(1, turns.count - late))]
-            with m.If(turns.steps):
-                m.d.sync += [
-                    word.eq(other) for word, other in zip(ring, [*ring[1:], self._next], strict=True)
-                ]
+            m.d.comb += self.value.eq(ring.first)
+            m.d.comb += self._next.eq(turns.late(m, self.value, f"{name}_stays") if late else self.value)
+            ring.takes(self._next)
 
     def becomes(self, m: Module, value: ValueLike) -> None:
         """Replace the word. A word that is not replaced stays."""

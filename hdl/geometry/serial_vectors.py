@@ -13,13 +13,13 @@ from blysk.golden.geometry.surface_words import SurfaceWords
 from blysk.golden.geometry.triangles import ATTRIBUTES, PIXEL_BITS
 from blysk.golden.geometry.vector_adapter import VectorAdapter
 from blysk.hdl.core.bits import select
+from blysk.hdl.core.ring import Ring, next_turn
 from blysk.hdl.core.views import copy, copy_fields
 from blysk.hdl.geometry.span_attributes import whole_span_shape
 from blysk.hdl.geometry.span_halver import is_apart, is_kept, shorter, size_of
 from blysk.hdl.geometry.surface_words import (
     STEP_BITS,
     attribute_count,
-    next_turn,
     placement_of,
     surface_count,
     surface_exponent,
@@ -131,7 +131,7 @@ class SerialVectorsUnit(wiring.Component):
 
         # The ends of a piece, or of the rest of a span, follow from the ends before.
         odd, renewed = Signal(name="odd"), renews | rest_goes
-        heads = self._rings(m, turns, comes, renewed, odd, steps)
+        heads = self._rings(m, (turns, place), comes, renewed, odd, steps)
         tag, pixels, uncut, words = self._pixels(m, comes & ends, retries, steps & ends, (whole, odd))
         kinds = turns & (comes | renewed | repeats), settles
         shift = self._test(m, heads, kinds, place, pixels, (fits, agrees))
@@ -163,12 +163,9 @@ class SerialVectorsUnit(wiring.Component):
 
         The last end is the far end of the whole span.
         """
-        given = self.i.payload
-        rings = {
-            name: [Signal(_WIDTH, name=f"{name}_{k}", reset_less=True) for k in range(self._count)]
-            for name in ("near", "far", "last", "step")
-        }
-        near, far, last, step = (ring[0] for ring in rings.values())
+        given, names = self.i.payload, ("near", "far", "last", "step")
+        rings = {name: Ring(m, name, _WIDTH, self._count, *turns) for name in names}
+        near, far, last, step = (rings[name].first for name in names)
         # After a piece the next pixel follows. After a try that does not fit, the end moves to one pixel
         # less, or to the mean of both ends.
         other = Mux(leaves, step, Mux(odd, near, ~step))
@@ -181,14 +178,11 @@ class SerialVectorsUnit(wiring.Component):
             "last": (given.far, last),
             "step": (given.inward, step),
         }
-        with m.If(turns):
-            for name, (new, old) in following.items():
-                ring = rings[name]
-                m.d.sync += [word.eq(behind) for word, behind in pairwise(ring)]
-                m.d.sync += ring[-1].eq(Mux(comes, Value.cast(new), old))
-        return {name: ring[0] for name, ring in rings.items()} | {
-            "new_near": rings["near"][-1],
-            "new_far": rings["far"][-1],
+        for name, (new, old) in following.items():
+            rings[name].takes(Mux(comes, Value.cast(new), old))
+        return {name: ring.first for name, ring in rings.items()} | {
+            "new_near": rings["near"].newest,
+            "new_far": rings["far"].newest,
         }
 
     def _pixels(self, m: Module, comes, retries, leaves, flags):

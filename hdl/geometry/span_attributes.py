@@ -104,7 +104,8 @@ class SpanAttributesUnit(wiring.Component):
     -------
     i : :py:`In(stream.Signature(planes_rows_shape(serial, surface)))`
         Scanlines. The planes are read while the first scanline of a triangle is offered. This is the first of
-        all scanlines, or the scanline after a scanline with ``last``.
+        all scanlines, or the scanline after a scanline with ``last``. In the serial form every scanline comes
+        with its planes.
     o : :py:`Out(stream.Signature(pieces_shape()))`
         Pieces, or whole spans in `whole_spans_shape` (if serial, in `whole_span_shape`).
     status : :py:`Out(counters_shape("empty", "cut"))`
@@ -174,7 +175,7 @@ class SpanAttributesUnit(wiring.Component):
         for k in range(count):
             plane = {name: planes[name] if self.serial else planes[name][k] for name in _WORDS}
             base, inward = self._down(m, k, accept, first, row.carry, plane, turns)
-            begin = Mux(first, _code(plane["inward"]), inward) if self.serial else inward
+            begin = _code(plane["inward"]) if self.serial else inward
             near, far = walk.values(m, f"attribute_{k}", loads, base, begin, inward, not self.whole)
             with m.If(turns.advance):
                 m.d.sync += [walked.near[k].eq(near), walked.far[k].eq(far), walked.step[k].eq(inward)]
@@ -235,14 +236,13 @@ class SpanAttributesUnit(wiring.Component):
     @staticmethod
     def _down(m: Module, k: int, accept, first, carry, plane, turns) -> tuple[Value, Value]:
         """An attribute's value at the long edge's pixel, and its step along a scanline."""
-        short, long, inward, edge = (
-            AttributeRing(m, f"{name}_{k}", turns) for name in ("short", "long", "inward", "edge")
-        )
+        inward, edge = (AttributeRing(m, f"{name}_{k}", turns) for name in ("inward", "edge"))
         start = Cat(
             Const(0, GradientSetup.FORMAT.fraction_bits - GradientSetup.START_FORMAT.fraction_bits),
             Value.cast(plane["start"]),
         )
         if turns.reads is not None:
+            short, long = (AttributeRing(m, f"{name}_{k}", turns) for name in ("short", "long"))
             with m.If(turns.reads):
                 edge.becomes(m, start)
                 for name, ring in (("short", short), ("long", long), ("inward", inward)):
@@ -250,15 +250,10 @@ class SpanAttributesUnit(wiring.Component):
             with m.Elif(accept):
                 edge.becomes(m, edge.value + Mux(carry, long.value, short.value))
             return edge.value, inward.value
-        steps = [
-            Mux(first, _code(plane[name]), ring.value) for name, ring in (("short", short), ("long", long))
-        ]
         base = Mux(first, start, edge.value)
         with m.If(accept):
-            edge.becomes(m, base + Mux(carry, steps[1], steps[0]))
-            with m.If(first):
-                for name, ring in (("short", short), ("long", long), ("inward", inward)):
-                    ring.becomes(m, _code(plane[name]))
+            edge.becomes(m, base + Mux(carry, _code(plane["long"]), _code(plane["short"])))
+            inward.becomes(m, _code(plane["inward"]))
         return base, inward.value
 
     def _convert(self, m: Module, valid: Signal, walked, result) -> None:

@@ -14,7 +14,6 @@ __all__ = [
     "attribute_count",
     "corner_surface_shape",
     "halved_surface_shape",
-    "next_turn",
     "placement_of",
     "surface_count",
     "surface_exponent",
@@ -62,11 +61,6 @@ def halved_surface_shape(surface: AttributeSpans | None) -> dict:
         "surface_step": data.ArrayLayout(unsigned(STEP_BITS), count),
     }
     return words | placement_of(surface)
-
-
-def next_turn(turn: Value, count: int) -> Value:
-    """Index of the turn after ``turn``, of ``count`` turns."""
-    return turn + 1 if count & (count - 1) == 0 else Mux(turn == count - 1, 0, turn + 1)
 
 
 def surface_start(code: Value) -> Value:
