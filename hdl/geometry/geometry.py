@@ -2,7 +2,7 @@
 
 from dataclasses import replace
 
-from amaranth.hdl import Array, Module, Signal, Value, unsigned
+from amaranth.hdl import Array, Cat, Module, Signal, Value, unsigned
 from amaranth.lib import data, stream, wiring
 from amaranth.lib.wiring import In, Out
 
@@ -12,7 +12,7 @@ from blysk.golden.geometry.plane_assembler import PlaneAssembler
 from blysk.golden.geometry.span_halver import SpanHalver
 from blysk.golden.geometry.triangles import ATTRIBUTES
 from blysk.golden.geometry.vector_adapter import VectorAdapter
-from blysk.hdl.core.memory import LUT_WORDS, UNCOUNTED, connect_late_fifo
+from blysk.hdl.core.memory import LUT_WORDS, UNCOUNTED, connect_late_fifo, connect_wide_fifo
 from blysk.hdl.core.ring import next_turn
 from blysk.hdl.core.single_register import connect_register, hold_output
 from blysk.hdl.core.stream import connect, moving
@@ -117,7 +117,11 @@ class _TriangleSetup(wiring.Component):
         serialiser, edges, planes = self._serialiser, self._edges, self._planes
         drawn = wiring.flipped(self.i)
         m.d.comb += copy(self._assembler.constants, self.constants)
-        _fork(m, drawn, edges.i, serialiser.i)
+        if self._compact:
+            # The serialiser takes a triangle some cycles later than the edge setup.
+            _fork_apart(m, drawn, edges.i, serialiser.i)
+        else:
+            _fork(m, drawn, edges.i, serialiser.i)
         for to in (edges.i.payload, serialiser.i.payload):
             m.d.comb += copy_fields(to, drawn.payload)
 
@@ -141,9 +145,10 @@ class _TriangleSetup(wiring.Component):
         if self._compact:
             # The first attributes of a triangle have left before those of the next but one come.
             depth = max(self._count * (ahead - 1), LUT_WORDS)
+            connect_wide_fifo(m, "waiting_attributes", serialiser.o, attributes, depth)
         else:
             depth = max(self._count * ahead + UNCOUNTED, BLOCK_WORDS)
-        connect_late_fifo(m, "waiting_attributes", serialiser.o, attributes, depth)
+            connect_late_fifo(m, "waiting_attributes", serialiser.o, attributes, depth)
         # While the gradients of a triangle are computed, the plane setup goes on with the next triangle.
         connect_register(m, "waiting_scale", planes.o, scales)
         to, turn = self._gradients.i, Signal(range(self._count), name="turn")
@@ -445,3 +450,14 @@ def _fork(m: Module, source: stream.Interface, first: stream.Interface, second: 
         second.valid.eq(source.valid & first.ready),
         source.ready.eq(first.ready & second.ready),
     ]
+
+
+def _fork_apart(m: Module, source: stream.Interface, *streams: stream.Interface) -> None:
+    """Fork a stream: others take its payload, each on its own cycle. The caller connects the fields."""
+    done = []
+    for k, to in enumerate(streams):
+        taken = Signal(name=f"taken_{k}")
+        m.d.comb += to.valid.eq(source.valid & ~taken)
+        done.append(taken | to.ready)
+        m.d.sync += taken.eq(source.valid & done[-1] & ~source.ready)
+    m.d.comb += source.ready.eq(Cat(done).all())
