@@ -181,7 +181,8 @@ class GeometryUnit(wiring.Component):
     In the *compact* style one divider serves all edges. One multiplier serves the gradients of all
     attributes. Attributes also take turns along the spans, and the normals of a span take turns. With vectors
     one unit cuts a span and makes the words of its pieces. In this style only the attributes have a FIFO in
-    the setup. Other words wait in registers.
+    the setup. The planes of two triangles are in a memory, and other words wait in registers. The sort keeps
+    a triangle until all its attributes are in the FIFO.
 
     The units work on several triangles at the same time, and the slowest unit sets the pace. A triangle
     takes:

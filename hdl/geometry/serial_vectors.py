@@ -38,7 +38,7 @@ class SerialVectorsUnit(wiring.Component):
     """Does the work of `SpanHalverUnit` and `VectorAdapterUnit` on one attribute a cycle, with equal results.
 
     The n attributes of a span are in rings that turn by one attribute a cycle. n is 4, and more with a
-    surface.
+    surface. Rings of more than `RING_REGISTERS` words are memories of look-up tables.
 
     1. A span comes in n turns. The turns also find the span's shift. They test whether the span fits, with
        the shift of the piece before. If the span's own shift differs, n more turns test again.
