@@ -173,7 +173,7 @@ class Build:
             return
         for excludes, reason, remedy in (
             (self.compact, "a pixel of the compact style takes several cycles", "use the throughput style"),
-            (self.takes_triangles, "the depth test takes single pixels", "leave out lanes, or use spans"),
+            (self.top == "geometry", "geometry gives spans, and no pixels", "leave out lanes"),
             (self.pipes > 1, "several pipelines give single pixels", "leave out lanes or pipes"),
             (self.bus != "native", f"a core on {self.bus} gives single pixels", "leave out lanes or bus"),
         ):
@@ -184,6 +184,11 @@ class Build:
     def shading(self) -> "Build":
         """The options of one shading pipeline, with all others at their defaults."""
         return Build(self.style, self.setup_interval, self.exponent, self.lanes)
+
+    @property
+    def pairs(self) -> bool:
+        """Whether a span of two pixels is a pair, see `QuotientLanes`. Hardware geometry makes no pairs."""
+        return self.lanes > 1 and not self.takes_triangles
 
     @property
     def takes_triangles(self) -> bool:

@@ -100,7 +100,7 @@ class ShadingPipeline:
     build: Build = field(default_factory=Build)
 
     def __post_init__(self) -> None:
-        method = self.interpolator.matched(self.specular).for_lanes(self.build.lanes)
+        method = self.interpolator.matched(self.specular).for_lanes(self.build.lanes, self.build.pairs)
         object.__setattr__(self, "interpolator", method)
         object.__setattr__(self, "specular", self.specular and method.unit_for(self.specular))
         Intensity(self.lights)

@@ -2,12 +2,14 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
+from typing import Any
 
 import numpy as np
 
 from blysk.golden.build import BuildError
 from blysk.golden.frame_constants import FrameConstants, by_material
 from blysk.golden.geometry.coarse_depth import CoarseDepth
+from blysk.golden.geometry.depth_lanes import DepthLanes
 from blysk.golden.geometry.depth_tester import DepthTester
 from blysk.golden.geometry.edge_normals import TrueSpans
 from blysk.golden.geometry.geometry import Geometry
@@ -46,6 +48,10 @@ class DrawnPixels:
         them; number of pixels of spans ``dropped`` before shading.
     out_of_range_spans : int
         Number of spans with a larger angle than the method serves.
+    lanes : int
+        Pixels of a beat.
+    beat, lane : int64 arrays, shape (P,), optional
+        Index of each pixel's beat, and the pixel's lane. Only with several lanes.
     """
 
     x: np.ndarray
@@ -56,12 +62,30 @@ class DrawnPixels:
     spans: TrueSpans | LineSpans | VectorSpans
     counts: dict[str, int]
     out_of_range_spans: int
+    lanes: int = 1
+    beat: np.ndarray | None = None
+    lane: np.ndarray | None = None
 
     @property
     def beats(self) -> dict[str, np.ndarray]:
-        """Output beats of the hardware: the fields of each pixel."""
+        """Output beats of the hardware: the fields of each pixel, or of the pixels of all lanes."""
         colors = dict(zip("rgb", self.color.T, strict=True))
-        return {"x": self.x, "y": self.y, **colors, "depth": self.depth}
+        if self.beat is None or self.lane is None:
+            return {"x": self.x, "y": self.y, **colors, "depth": self.depth}
+        first = np.flatnonzero(np.r_[True, self.beat[1:] != self.beat[:-1]][: len(self.beat)])
+        shape = len(first), self.lanes
+        channels = np.zeros(shape, [(name, np.uint8) for name in "rgb"])
+        for name, channel in colors.items():
+            channels[name][self.beat, self.lane] = channel
+        present, depths = np.zeros(shape, dtype=np.int64), np.zeros(shape, dtype=np.int64)
+        present[self.beat, self.lane], depths[self.beat, self.lane] = 1, self.depth
+        return {
+            "x": (self.x - self.lane)[first],
+            "y": self.y[first],
+            "present": (present << np.arange(self.lanes)).sum(axis=1),
+            "colors": channels,
+            "depths": depths,
+        }
 
 
 @dataclass(frozen=True)
@@ -192,7 +216,16 @@ class Renderer:
             | {"spans": len(spans), "pixels": len(drawn), "hidden": int((~drawn).sum())}
             | {"dropped": dropped},
             out_of_range_spans=pixels.out_of_range_spans,
+            **self._lanes(spans.length, drawn),
         )
+
+    def _lanes(self, length: np.ndarray, drawn: np.ndarray) -> dict[str, Any]:
+        """Fields of `DrawnPixels` for several lanes, from the spans' lengths and which pixels are drawn."""
+        lanes = self.design.build.lanes
+        if lanes == 1:
+            return {}
+        beat, lane = DepthLanes(lanes).beats(length, drawn)
+        return {"lanes": lanes, "beat": beat, "lane": lane}
 
     def _for_lights(
         self, spans: TrueSpans | LineSpans | VectorSpans, constants: FrameConstants

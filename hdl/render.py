@@ -19,14 +19,15 @@ from blysk.hdl.core.stream import connect, moving
 from blysk.hdl.core.views import copy, copy_fields
 from blysk.hdl.frame_constants import write_shape
 from blysk.hdl.geometry.coarse_depth import CoarseDepthUnit
-from blysk.hdl.geometry.depth_tester import DepthMemory, DepthTesterUnit, drawn_pixel_shape
+from blysk.hdl.geometry.depth_lanes import DepthLanesUnit
+from blysk.hdl.geometry.depth_tester import DepthTesterUnit
 from blysk.hdl.geometry.geometry import GeometryUnit
 from blysk.hdl.geometry.light_adapter import LightAdapterUnit, with_components
 from blysk.hdl.geometry.mirror_adapter import MirrorAdapterUnit
 from blysk.hdl.geometry.span_adapter import connect_shading_span
 from blysk.hdl.geometry.triangles import COUNTER_BITS, counters_shape, frame_shape, triangle_shape
 from blysk.hdl.pipeline import SPACED, ShadingPipelineUnit
-from blysk.hdl.port_descriptions import COUNTER_TEXTS, TEXTURE_TEXTS
+from blysk.hdl.port_descriptions import COUNTER_TEXTS, LANE_DESCRIPTIONS, TEXTURE_TEXTS
 
 __all__ = [
     "PORT_DESCRIPTIONS",
@@ -34,6 +35,7 @@ __all__ = [
     "WAITING_SPANS",
     "WAITING_WORDS",
     "RendererUnit",
+    "port_descriptions",
     "waiting_spans",
 ]
 
@@ -73,6 +75,29 @@ PORT_DESCRIPTIONS = {
     "memory_write_data": "depth for memory_write_place; all ones while the core clears the memory",
 }
 """Ports of a unit without a ``size`` (the memory of its depths is outside), for the table in Verilog."""
+
+
+def port_descriptions(lanes: int = 1) -> dict[str, str]:
+    """`PORT_DESCRIPTIONS` of a unit with a number of lanes."""
+    if lanes == 1:
+        return PORT_DESCRIPTIONS
+    texts = dict(PORT_DESCRIPTIONS)
+    for name in ("o_r", "o_g", "o_b", "o_depth"):
+        del texts[name]
+    texts |= {
+        "o_x": LANE_DESCRIPTIONS["o_x"],
+        "o_y": LANE_DESCRIPTIONS["o_y"],
+        "o_present": "a bit for each lane with a pixel to write; at least one lane has a pixel",
+        "o_colors": LANE_DESCRIPTIONS["o_colors"],
+        "o_depths": "depth of the pixel of a lane; 0 without a pixel",
+    }
+    for name in [name for name in texts if name.startswith("memory_")]:
+        text, beside = texts.pop(name), f"; x is its column div {lanes}" if name.endswith("place") else ""
+        for bank in range(lanes):
+            of_bank = f"memory_{bank}_"
+            texts[name.replace("memory_", of_bank)] = text.replace("memory_", of_bank) + beside
+    return texts
+
 
 _DEEP = {"depth": FixedShape(SPAN_DEPTH), "depth_step": FixedShape(DEPTH_STEP)}
 """Words of a span for the depth test. Shading does not take them."""
@@ -122,7 +147,8 @@ class RendererUnit(wiring.Component):
     """Turns triangles into the pixels to write. `Renderer` is the bit-accurate model.
 
     `GeometryUnit` turns triangles into spans, `ShadingPipelineUnit` turns spans into pixels, and
-    `DepthTesterUnit` drops hidden pixels. Spans wait for the pipeline in a FIFO or a register
+    `DepthTesterUnit` drops hidden pixels. With several lanes a beat has several pixels of a span, and
+    `DepthLanesUnit` drops hidden pixels. Spans wait for the pipeline in a FIFO or a register
     (`waiting_spans`, `WAITING_WORDS`). The depths of the spans go beside the pipeline, in another FIFO. With
     a coarse depth test a span also waits for the test's answer. Then the pipeline takes the span, or the unit
     drops it in one cycle. The units work at the same time. If no unit waits for long, a frame takes as many
@@ -154,7 +180,7 @@ class RendererUnit(wiring.Component):
     i : :py:`In(stream.Signature(triangle_shape(grid, surface)))`
         Triangles.
     o : :py:`Out(stream.Signature(drawn_pixel_shape(x_bits, y_bits)))`
-        Pixels to write.
+        Pixels to write. With several lanes the payload is ``drawn_beat_shape(x_bits, y_bits, lanes)``.
     write : :py:`In(stream.Signature(write_shape()))`
         Frame constants of the shading pipeline.
     constants : :py:`In(frame_shape())`
@@ -163,7 +189,8 @@ class RendererUnit(wiring.Component):
     status : :py:`Out(counters_shape(*STATUS))`
         Counters since the reset.
     memory : :py:`Out(DepthMemory(x_bits, y_bits))`
-        Port of the memory of depths. Only without a ``size``.
+        Port of the memory of depths. Only without a ``size``. With several lanes a memory for each bank of
+        columns, see `DepthLanesUnit`.
 
     Attributes
     ----------
@@ -189,16 +216,20 @@ class RendererUnit(wiring.Component):
         self._adapters()
         coarse, bits = self.model.coarse, (design.x_bits, design.y_bits)
         self.coarse = None if coarse is None else CoarseDepthUnit(coarse, *bits)
-        self.depth = DepthTesterUnit(*bits, size, clears)
+        self.depth = (
+            DepthTesterUnit(*bits, size, clears)
+            if design.build.lanes == 1
+            else DepthLanesUnit(*bits, size, clears, design.build.lanes)
+        )
         members = {
             "i": In(stream.Signature(triangle_shape(geometry.grid, geometry.surface))),
-            "o": Out(stream.Signature(drawn_pixel_shape(design.x_bits, design.y_bits))),
+            "o": Out(self.depth.o.signature),
             "write": In(stream.Signature(write_shape())),
             "constants": In(_constants_shape(clears or coarse is not None)),
             "status": Out(counters_shape(*STATUS)),
         }
         if size is None:
-            members["memory"] = Out(DepthMemory(design.x_bits, design.y_bits))
+            members["memory"] = self.depth.signature.members["memory"]
         super().__init__(members)
         self.idle = Signal(name="idle")
 
@@ -212,7 +243,9 @@ class RendererUnit(wiring.Component):
         connect(m, wiring.flipped(self.write), pipeline.write)
         connect(m, depth.o, wiring.flipped(self.o))
         if depth.size is None:
-            wiring.connect(m, depth.memory, wiring.flipped(self.memory))
+            outside = self.memory if len(depth.ports) > 1 else [self.memory]
+            for port, memory in zip(depth.ports, outside, strict=True):
+                wiring.connect(m, port, wiring.flipped(memory))
         if depth.clears:
             given = self.constants
             m.d.comb += [

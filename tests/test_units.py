@@ -37,7 +37,8 @@ SELDOM = (
     *("texture_address", "texel_memory", "texture_filter", "texture_sampler"),
     *("serial_vectors", "serial_vertex_sort"),
     *("attribute_spans", "attributes", "albedo"),
-    *("vector_adapter", "halfway_vector", "mirror_adapter", "light_adapter", "coarse_depth", "depth_tester"),
+    *("vector_adapter", "halfway_vector", "mirror_adapter", "light_adapter", "coarse_depth"),
+    *("depth_tester", "depth_lanes"),
     *("motion", "draw_commands", "mesh_memory", "vertex_unit", "triangle_assembly", "tmds_encoder"),
     *("packet_decoder", "uart_receiver", "quotient_lanes"),
 )

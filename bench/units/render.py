@@ -95,6 +95,9 @@ def _variants():
         ("quotient, phong, coarse", {"model": "phong"}),
         ("quotient, phong, compact", {"model": "phong", "style": "compact"}),
         ("quotient, 2 lights", {"lights": 2}),
+        ("quotient, 2 lanes", {}),
+        ("quotient, phong, 2 lights, 2 lanes, coarse, 2 setups", {"model": "phong", "lights": 2}),
+        ("quotient, no highlights, 2 lanes, compact geometry", {"model": None}),
         (
             "quotient, phong, 3 lights, compact, coarse",
             {"model": "phong", "style": "compact", "lights": 3, "materials": 2},
@@ -110,7 +113,10 @@ def _variants():
         if "colours" in name:
             design = replace(design, albedo=Albedo(texture=_TEXTURE if "textures" in name else None))
         coarse = CoarseDepth(*_SIZE) if "coarse" in name else None
-        renderer = Renderer(design.built(top="render", coarse=coarse))
+        build = {"lanes": 2} if "2 lanes" in name else {}
+        build |= {"setups": 2} if "2 setups" in name else {}
+        build |= {"geometry_style": "compact"} if "compact geometry" in name else {}
+        renderer = Renderer(design.built(top="render", coarse=coarse, **build))
         yield name, Variant(partial(RendererUnit, renderer, _SIZE), long=name != "quotient")
 
 

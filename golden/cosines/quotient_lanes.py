@@ -54,12 +54,16 @@ class QuotientLanes(QuotientSpans):
     With highlights a span brings its lines, exact l of ``start`` and of ``step``. So the hardware has no
     multiplier for them. The line of a pixel is the same to the bit.
 
+    Spans of hardware geometry have no pairs and no lines. They are the spans of `QuotientSpans`.
+
     Parameters
     ----------
     lights, highlights, mirror
         Those of `QuotientSpans`.
     lanes : int
         Number of lanes, 2.
+    pairs : bool
+        Whether spans of two pixels are pairs, and spans bring lines.
 
     Raises
     ------
@@ -70,6 +74,7 @@ class QuotientLanes(QuotientSpans):
     """
 
     lanes: int = 2
+    pairs: bool = True
 
     def __post_init__(self) -> None:
         super().__post_init__()
@@ -78,8 +83,8 @@ class QuotientLanes(QuotientSpans):
 
     @property
     def brings_lines(self) -> bool:
-        """``True`` with highlights. Without highlights l is z, times a constant."""
-        return self.highlights
+        """``True`` for pairs with highlights. Without highlights l is z, times a constant."""
+        return self.highlights and self.pairs
 
     def with_lines(self, vectors: SpanVectors, direction: np.ndarray) -> SpanVectors:
         """Vectors with their lines; see `QuotientSpans.line` for the direction."""
@@ -98,8 +103,9 @@ class QuotientLanes(QuotientSpans):
         ValueError
             As `QuotientSpans.compute` does.
         """
-        apart, each, _ = separate_pairs(vectors, length)
-        return super().compute(apart, each, direction)
+        if self.pairs:
+            vectors, length, _ = separate_pairs(vectors, length)
+        return super().compute(vectors, length, direction)
 
     def beats(self, pixels: PixelWords, length: np.ndarray) -> tuple[PixelWords, np.ndarray, np.ndarray]:
         """Words of each beat, from the words of the pixels.

@@ -254,8 +254,15 @@ class Interpolator(ABC):
         """Whether a pipeline of the method can have several lanes."""
         return False
 
-    def for_lanes(self, lanes: int) -> "Interpolator":
+    def for_lanes(self, lanes: int, pairs: bool = True) -> "Interpolator":
         """The method for a pipeline with a number of lanes.
+
+        Parameters
+        ----------
+        lanes : int
+            Number of lanes.
+        pairs : bool
+            Whether spans come from software, which makes pairs for several lanes, see `QuotientLanes`.
 
         Raises
         ------

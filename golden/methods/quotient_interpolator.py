@@ -50,7 +50,7 @@ class QuotientInterpolator(Interpolator):
         Whether the highlight is Phong's, of R·V, in place of N·H.
     pairs : bool
         Whether a span of two pixels is a pair, see `QuotientLanes`. A pipeline with several lanes takes
-        pairs.
+        pairs from software, and spans without pairs from hardware geometry.
 
     Source: docs/theory/quotient.md.
     """
@@ -112,9 +112,10 @@ class QuotientInterpolator(Interpolator):
         mirror = specular is not None and specular.reflection.MIRROR
         return self if mirror == self.mirror else replace(self, mirror=mirror)
 
-    def for_lanes(self, lanes: int) -> "QuotientInterpolator":
-        """The method, with pairs for several lanes."""
-        return self if (lanes > 1) == self.pairs else replace(self, pairs=lanes > 1)
+    def for_lanes(self, lanes: int, pairs: bool = True) -> "QuotientInterpolator":
+        """The method, with pairs for several lanes, if the source of spans makes pairs."""
+        pairs = pairs and lanes > 1
+        return self if pairs == self.pairs else replace(self, pairs=pairs)
 
     def sent(self, spans: Spans, constants: Sequence[FrameConstants] = (), highlights: bool = True) -> Spans:
         """Spans with pairs and lines, if the pipeline takes pairs.

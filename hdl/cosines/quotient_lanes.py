@@ -37,6 +37,9 @@ class QuotientLanesUnit(QuotientSpansUnit):
     pixels or more takes two cycles, and no span takes more cycles than it has beats. Spans bring their lines,
     which then need no multiplier. First differences wait in a FIFO, second differences in registers.
 
+    Without pairs a span of two pixels takes two cycles, too. Its words are those of `QuotientSpans`. Each
+    line then has two multipliers. They take the step in the first cycle of a span, and the start in the last.
+
     *Accumulators.* Beat j has the pixels 2 j and 2 j + 1. With ``D1`` and ``D2`` of `QuotientSpans`, three
     words of each square change from beat to beat:
 
@@ -67,7 +70,9 @@ class QuotientLanesUnit(QuotientSpansUnit):
     Members
     -------
     i, begun
-        Those of `QuotientSpansUnit`. With highlights spans bring lines, and the unit has no ``constants``.
+        Those of `QuotientSpansUnit`.
+    constants : :py:`In(line_directions_shape(model))`
+        As in `QuotientSpansUnit`. Only if there are highlights and no pairs.
     o : :py:`Out(stream.Signature(lane_words_shape(model)))`
         Words of the pixels.
 
@@ -91,7 +96,8 @@ class QuotientLanesUnit(QuotientSpansUnit):
     @property
     def multipliers(self) -> int:
         """Number of multipliers."""
-        return 2 * sum(map(len, self.model.squares))
+        p = self.model
+        return 2 * (sum(map(len, p.squares)) + p.lights * (p.highlights and not p.brings_lines))
 
     @property
     def spans_inside(self) -> int:
@@ -100,16 +106,15 @@ class QuotientLanesUnit(QuotientSpansUnit):
 
     # Setup.
 
-    @staticmethod
-    def _few_of(last: Value) -> Value:
-        """Five bits, from the index of the last pixel.
+    def _few_of(self, last: Value) -> Value:
+        """Four or five bits, from the index of the last pixel.
 
-        Whether there are two pixels or more; whether there are at most one, two, three beats; whether the
-        span is a pair.
+        Whether there are two pixels or more; whether there are at most one, two, three beats; with pairs
+        whether the span is a pair.
         """
         beats = last[1:]
         few = ~beats.any(), ~beats[1:].any(), ~beats[2:].any() & ~beats[:2].all()
-        return Cat(last.any(), *few, last[0] & ~beats.any())
+        return Cat(last.any(), *few, *([last[0] & ~beats.any()] if self.model.pairs else []))
 
     def _set_up(self, m: Module, second, first, start: stream.Interface) -> None:
         """Turns, products, sums and shifts, up to differences and starts that wait."""
@@ -117,7 +122,7 @@ class QuotientLanesUnit(QuotientSpansUnit):
         moves, begun = Signal(name="moves"), Signal(name="has_begun")
         # A longer span takes a cycle for its second differences, and then the cycle that ends every span.
         is_long = span.length[1:].any()
-        is_pair = is_long & ~span.length[0] & ~span.length[2:].any()
+        is_pair = is_long & ~span.length[0] & ~span.length[2:].any() if p.pairs else Const(0)
         is_second = ~begun & is_long & ~is_pair
         ends = begun | ~is_long | is_pair
         m.d.comb += [self.i.ready.eq(moves & ends), self.begun.eq(begun)]
@@ -145,7 +150,11 @@ class QuotientLanesUnit(QuotientSpansUnit):
             return found
 
         at_sums, at_coarse = here[self._SUMS], here[self._SUMS + 1]
-        starts, changes = self._lines(register, delayed, (begin, step), is_second)
+        if p.pairs or not p.highlights:
+            starts, changes = self._lines(delayed, (begin, step), is_second)
+        else:
+            keeps = is_second, at_sums[0], moves & at_sums[0]
+            starts, changes = self._made_lines(m, (register, delayed, product), (begin, step), keeps)
         to_start = stream.Signature(start.payload.shape()).create(path=("to_start",))
         m.d.comb += [
             to_start.valid.eq(at_sums[2] & moves),
@@ -161,15 +170,20 @@ class QuotientLanesUnit(QuotientSpansUnit):
 
         # The square of the second vector of a pair is shifted as far as that of the first vector.
         before = self._SUMS - 1
-        paired, exponent = delayed(is_pair, "paired", before), delayed(span.exponent, "exponent", before)
+        paired = delayed(is_pair, "paired", before) if p.pairs else Const(0)
+        exponent = delayed(span.exponent, "exponent", before)
         doubled = Mux(here[before][0], Cat(Const(0, 1), exponent), exponent)[:5]
         amount = register(Mux(paired, 1, doubled), "amount")
         exponent = register(Mux(paired, 0, exponent), f"exponent_{self._SUMS}")
-        operand = {name: Mux(begun, begin[name], step[name]) for name in begin}
+        # Without pairs the lines have the same operands.
+        takes_begin = begun if p.pairs else ~is_second
+        operand = {name: Mux(takes_begin, begin[name], step[name]) for name in begin}
         shifted = self._shifted(register, (squares(operand, step, "change"), amount), (changes, exponent))
         # Marks of first differences: whether they are of a pair, and signs of the second vector's z.
-        marks = [delayed(paired, "paired", self._SHIFTED - 1, self._SUMS)]
-        signs = [step[f"z{light}"][-1] for light in range(p.lights)] if p.takes_heights else []
+        signs, marks = [], []
+        if p.pairs:
+            marks = [delayed(paired, "paired", self._SHIFTED - 1, self._SUMS)]
+            signs = [step[f"z{light}"][-1] for light in range(p.lights)] if p.takes_heights else []
         marks += [delayed(sign, f"sign_{light}", self._SHIFTED - 1) for light, sign in enumerate(signs)]
         # First differences of pairs may come on every cycle, so they wait in a FIFO.
         shape = data.StructLayout({"words": first[0].shape(), "marks": len(marks)})
@@ -185,7 +199,7 @@ class QuotientLanesUnit(QuotientSpansUnit):
             first[1].eq(waiting.valid),
         ]
         connect_wide_fifo(m, "firsts", made, waiting, self.FIRSTS)
-        self._firsts, self._marks = waiting, waiting.payload.marks
+        self._firsts, self._marks = waiting, waiting.payload.marks if p.pairs else Const(0)
         waits = (at_coarse[0] & second[1]) | (at_coarse[1] & ~made.ready) | (at_sums[2] & ~to_start.ready)
         m.d.comb += moves.eq(~waits)
         with m.If(moves & at_coarse[0]):
@@ -193,9 +207,7 @@ class QuotientLanesUnit(QuotientSpansUnit):
             for target, value in zip((*second[0].squares, *second[0].lines), shifted, strict=True):
                 m.d.sync += target.eq(value[: len(target)])
 
-    def _lines(
-        self, register: Callable, delayed: Callable, vectors: Any, is_second: Value
-    ) -> tuple[list[Value], list[Value]]:
+    def _lines(self, delayed: Callable, vectors: Any, is_second: Value) -> tuple[list[Value], list[Value]]:
         """Lines of starts and of differences. With second differences it is z times 2^16, if z is taken."""
         p, span, found = self.model, self.i.payload, []
         for kind, vector in zip(("start", "change"), vectors, strict=True):
@@ -212,6 +224,31 @@ class QuotientLanesUnit(QuotientSpansUnit):
                 lines.append(delayed(line, f"{kind}_line_{light}", self._SUMS))
             found.append(lines)
         return found[0], found[1]
+
+    def _made_lines(
+        self, m: Module, stages: Any, vectors: Any, seconds: Any
+    ) -> tuple[list[Value], list[Value]]:
+        """Lines from products, of the step in the first cycle of a span and of the start in the last cycle.
+
+        ``seconds`` has three conditions: words of the span are for second differences; so are the sums; the
+        sums move on, too. The line of a step waits, because the last cycle of a span may come later.
+        """
+        (register, delayed, product), (begin, step) = stages, vectors
+        is_second, sums_are_second, keeps = seconds
+        starts, changes = [], []
+        for light in range(self.model.lights):
+            products = [
+                product(Mux(~is_second, begin[axis], step[axis]), code.as_value(), f"line_{axis}")
+                for axis, code in zip((f"x{light}", f"z{light}"), self.constants[light], strict=True)
+            ]
+            starts.append(register(products[0] + products[1], f"line_sum_{light}"))
+            changes.append(Signal.like(starts[-1], name=f"change_line_{light}", reset_less=True))
+            with m.If(keeps):
+                m.d.sync += changes[-1].eq(starts[-1])
+            if self.model.takes_heights:
+                height = delayed(step[f"z{light}"], f"change_height_{light}", self._SUMS)
+                changes[-1] = Mux(sums_are_second, height << 16, changes[-1])
+        return starts, changes
 
     def _halved(self, takes_first: Value) -> Value:
         return takes_first & ~self._marks[0]
@@ -233,7 +270,8 @@ class QuotientLanesUnit(QuotientSpansUnit):
         may_second, may_first = Signal(name="may_second", init=1), Signal(name="may_first")
         # Whether the last beat of a span has two pixels.
         even = Signal(name="even")
-        takes_differences, one, at_most_two, at_most_three, self._starts_pair = self._few
+        takes_differences, one, at_most_two, at_most_three, *pair = self._few
+        self._starts_pair = pair[0] if pair else Const(0)
         starts = takes[2] & takes_differences
         starts_three = starts & ~self._starts_pair
         # A span of one or two beats needs no second differences any more when it starts, and a pair no first
@@ -287,16 +325,19 @@ class QuotientLanesUnit(QuotientSpansUnit):
         def accumulate(begin: Value, step: Value, gap: Value, results: Any, name: str) -> None:
             """Accumulate a word, and show it in both lanes."""
             value, base = (Signal.like(begin, name=word, reset_less=True) for word in (name, f"{name}_base"))
+            words = (value, base) if p.pairs else (value,)
             with m.If(advance):
-                m.d.sync += [word.eq(Mux(takes_start, begin, value + step)) for word in (value, base)]
+                m.d.sync += [word.eq(Mux(takes_start, begin, value + step)) for word in words]
                 # The word of the second lane is its base and the gap. The gap of a pair is the whole word.
                 with m.If(takes_start & self._starts_pair):
                     m.d.sync += base.eq(0)
+            base = words[-1]
             show(0, value, results[0], name)
             show(1, (base + gap)[: len(value)], results[1], name)
 
-        with m.If(advance & takes_start):
-            m.d.sync += is_pair.eq(self._starts_pair)
+        if p.pairs:
+            with m.If(advance & takes_start):
+                m.d.sync += is_pair.eq(self._starts_pair)
         # On the cycle after first differences were taken, the gap of their first beat is made.
         loads = Signal(name="loads")
         with m.If(advance):
@@ -371,9 +412,12 @@ class QuotientLanesUnit(QuotientSpansUnit):
         with m.If(advance):
             with m.If(takes[0]):
                 m.d.sync += following.eq(step[6 : 6 + width])
-            with m.If(takes[1]):
-                m.d.sync += next_sign.eq(self._marks[1 + light])
+            if p.pairs:
+                with m.If(takes[1]):
+                    m.d.sync += next_sign.eq(self._marks[1 + light])
+                with m.If(takes[2]):
+                    m.d.sync += sign.eq(next_sign)
             with m.If(takes[2]):
-                m.d.sync += [current.eq(following), sign.eq(next_sign)]
+                m.d.sync += current.eq(following)
             m.d.sync += height.eq(Mux(takes[2], begin, height + (current << 1)))
         return height[-1], Mux(is_pair, sign, (height + current)[width - 1])

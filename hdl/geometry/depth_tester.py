@@ -23,6 +23,7 @@ __all__ = [
     "drawn_pixel_shape",
     "is_inside",
     "picture_shape",
+    "saturated",
 ]
 
 
@@ -121,6 +122,8 @@ class DepthTesterUnit(wiring.Component):
     ----------
     idle : Signal
         High while no pixel is inside.
+    ports : sequence of interfaces
+        Ports of the memory, or of each of several memories.
 
     Source: docs/theory/geometry.md#depth; not in the documents.
     """
@@ -130,26 +133,42 @@ class DepthTesterUnit(wiring.Component):
     ):
         self.x_bits, self.y_bits, self.size, self.clears = x_bits, y_bits, size, clears
         self.latency = 3 if size else 4
+        memory = self._memory()
         members = {
-            "i": In(stream.Signature(deep_pixel_shape(x_bits, y_bits))),
-            "o": Out(stream.Signature(drawn_pixel_shape(x_bits, y_bits))),
+            "i": In(stream.Signature(self._input_shape())),
+            "o": Out(stream.Signature(self._output_shape())),
             "status": Out(counters_shape("pixels", "hidden")),
         }
-        port = DepthMemory(x_bits, y_bits)
         if size is None:
-            members["memory"] = Out(port)
+            members["memory"] = memory
         if clears:
             members["picture"] = In(picture_shape(x_bits, y_bits))
         super().__init__(members)
-        self._port = port.create(path=("port",)) if size else self.memory
+        if size:
+            ports = range(*memory.dimensions) if memory.dimensions else [""]
+            self.ports = [memory.signature.create(path=(f"port{number}",)) for number in ports]
+        else:
+            self.ports = self.memory if memory.dimensions else [self.memory]
         self.idle = Signal(name="idle")
+
+    def _input_shape(self) -> data.StructLayout:
+        """Shape of an input beat."""
+        return deep_pixel_shape(self.x_bits, self.y_bits)
+
+    def _output_shape(self) -> data.StructLayout:
+        """Shape of an output beat."""
+        return drawn_pixel_shape(self.x_bits, self.y_bits)
+
+    def _memory(self) -> wiring.Member:
+        """The member for the memory of the depths."""
+        return Out(DepthMemory(self.x_bits, self.y_bits))
 
     def elaborate(self, platform):
         """Depth of the pixel; the memory's word; their comparison; the write."""
         m = Module()
-        port, incoming = self._port, self.i.payload
+        port, incoming = self.ports[0], self.i.payload
         if self.size:
-            self._remember(m)
+            self._remember(m, port, self.size)
         advance, accept = Signal(name="advance"), Signal(name="accept")
         last = self.latency - 1
         stages = [Signal(self.o.payload.shape(), name=f"pixel_{k}") for k in range(self.latency)]
@@ -172,8 +191,7 @@ class DepthTesterUnit(wiring.Component):
             with m.If(first):
                 m.d.sync += step.eq(incoming.depth_step)
 
-        code = total.as_signed() >> SPAN_DEPTH.fraction_bits
-        depth = Mux(code < 0, 0, Mux(code > DepthTester.FARTHEST, DepthTester.FARTHEST, code))
+        depth = saturated(total)
         nearer, drawn = Signal(name="nearer"), Signal(name="drawn")
         # These words are written after the read, or on the same cycle.
         late = [(valid[last], stages[last])] + [
@@ -228,22 +246,23 @@ class DepthTesterUnit(wiring.Component):
 
     def _clear(self, m: Module, empty: Value) -> Value:
         """Write to every place of a picture before its first pixel. Returns whether pixels are held back."""
-        picture, port = self.picture, self._port
+        picture = self.picture
         before, stale, sweeps = Signal(name="number"), Signal(name="stale", init=1), Signal(name="sweeps")
-        place = Signal(port.write_place.shape(), name="place")
+        place = Signal(self.ports[0].write_place.shape(), name="place")
         turns = picture.number != before
         # In a picture larger than the coordinates, the largest coordinate is the last place.
         ends = {
-            name: place[name].all() | (place[name] + 1 >= picture[size])
-            for name, size in (("x", "width"), ("y", "height"))
+            name: place[name].all() | (place[name] + 1 >= size)
+            for name, size in (("x", self._columns()), ("y", picture.height))
         }
         m.d.sync += [before.eq(picture.number), stale.eq(stale | turns)]
         with m.If(sweeps):
-            m.d.comb += [
-                port.write_enable.eq(1),
-                copy(port.write_place, place),
-                port.write_data.eq(DepthTester.CLEARED),
-            ]
+            for port in self.ports:
+                m.d.comb += [
+                    port.write_enable.eq(1),
+                    copy(port.write_place, place),
+                    port.write_data.eq(DepthTester.CLEARED),
+                ]
             m.d.sync += place.x.eq(Mux(ends["x"], 0, place.x + 1))
             with m.If(ends["x"]):
                 m.d.sync += [place.y.eq(Mux(ends["y"], 0, place.y + 1)), sweeps.eq(~ends["y"])]
@@ -251,23 +270,33 @@ class DepthTesterUnit(wiring.Component):
             m.d.sync += [sweeps.eq(1), stale.eq(turns)]
         return stale | turns | sweeps
 
-    def _remember(self, m: Module) -> None:
-        """A memory of the picture's size at the port. The memory holds inverted depths."""
+    def _columns(self) -> Value:
+        """Columns of the picture."""
+        return self.picture.width
+
+    def _remember(self, m: Module, port, size: tuple[int, int], name: str = "depths") -> None:
+        """A memory of a size at a port. The memory holds inverted depths."""
         # Inverted, so that a cleared memory holds zeros.
-        port, (width, height) = self._port, self.size
-        m.submodules.depths = memory = Memory(shape=DEPTH.width, depth=width * height, init=[])
+        width, height = size
+        m.submodules[name] = memory = Memory(shape=DEPTH.width, depth=width * height, init=[])
         read, write = memory.read_port(), memory.write_port()
         outside = Signal(name="read_outside")
         with m.If(port.read_enable):
-            m.d.sync += outside.eq(~is_inside(port.read_place, self.size))
+            m.d.sync += outside.eq(~is_inside(port.read_place, size))
         m.d.comb += [
             read.addr.eq(port.read_place.y * width + port.read_place.x),
             read.en.eq(port.read_enable),
             port.read_data.eq(Mux(outside, DepthTester.CLEARED, ~read.data)),
             write.addr.eq(port.write_place.y * width + port.write_place.x),
-            write.en.eq(port.write_enable & is_inside(port.write_place, self.size)),
+            write.en.eq(port.write_enable & is_inside(port.write_place, size)),
             write.data.eq(~port.write_data),
         ]
+
+
+def saturated(total: Value) -> Value:
+    """Depth of a pixel from the sum of a span's depth and steps."""
+    code = total.as_signed() >> SPAN_DEPTH.fraction_bits
+    return Mux(code < 0, 0, Mux(code > DepthTester.FARTHEST, DepthTester.FARTHEST, code))
 
 
 def _place(pixel) -> Value:

@@ -29,8 +29,8 @@ class QuotientInterpolatorUnit(InterpolatorUnit, model=QuotientInterpolator):
     range.
 
     With two lanes `QuotientLanesUnit` gives the words of two pixels. Each lane has a `QuotientUnit`. Both
-    have the same handshakes, so they are in the same state on every cycle. Spans bring their lines, so the
-    constants are not read.
+    have the same handshakes, so they are in the same state on every cycle. With pairs spans bring their
+    lines, so the constants are not read.
 
     Parameters
     ----------
@@ -87,7 +87,7 @@ class QuotientInterpolatorUnit(InterpolatorUnit, model=QuotientInterpolator):
         super().__init__(model, lights, **options)
         spans = model.spans(lights, self.highlights)
         if self.lanes > 1:
-            beats = QuotientLanes(spans.lights, spans.highlights, spans.mirror, self.lanes)
+            beats = QuotientLanes(spans.lights, spans.highlights, spans.mirror, self.lanes, model.pairs)
             self._spans = QuotientLanesUnit(beats, self.length_bits)
         else:
             # If a pixel takes several cycles, one multiplier has enough time for a span.
@@ -114,7 +114,7 @@ class QuotientInterpolatorUnit(InterpolatorUnit, model=QuotientInterpolator):
             self.i.ready.eq(spans.i.ready),
             self.begun.eq(spans.begun),
         ]
-        if self.highlights and self.lanes == 1:
+        if "constants" in spans.signature.members:
             for given, light in zip(spans.constants, self.constants, strict=True):
                 m.d.comb += [given[0].eq(light.direction[0]), given[1].eq(light.direction[2])]
         if self.lanes == 1:

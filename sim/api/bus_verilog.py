@@ -7,7 +7,7 @@ from blysk.hdl.bus.bus import PORT_DESCRIPTIONS, BusUnit
 from blysk.hdl.geometry.geometry import PORT_DESCRIPTIONS as GEOMETRY_PORT_DESCRIPTIONS
 from blysk.hdl.geometry.geometry import GeometryUnit
 from blysk.hdl.render import PORT_DESCRIPTIONS as RENDER_PORT_DESCRIPTIONS
-from blysk.hdl.render import RendererUnit
+from blysk.hdl.render import RendererUnit, port_descriptions
 from blysk.sim.api.bus_documents import beats_text, frame_text, layout_lines
 
 __all__ = ["bus_descriptions", "bus_header", "triangle_descriptions"]
@@ -35,9 +35,10 @@ _NARROW = {
 def triangle_descriptions(unit: RendererUnit | GeometryUnit) -> dict[str, str]:
     """Descriptions of the ports of a core that takes triangles."""
     members = unit.i.payload.shape().members
+    lanes = unit.model.design.build.lanes if isinstance(unit, RendererUnit) else 1
     given = {
         port: text
-        for port, text in RENDER_PORT_DESCRIPTIONS.items()
+        for port, text in port_descriptions(lanes).items()
         if not port.startswith("i_") or port[2:] in members
     }
     if frame := frame_text(unit):

@@ -266,7 +266,7 @@ def _built(settings: Settings, design: ShadingPipeline) -> ShadingPipeline:
         # The caller's design may have build options of a core. The settings replace them.
         return built(replace(design, build=design.build.shading), given)
     except OptionError as error:
-        if error.option == "geometry" or (error.option in ("lanes", "pipes") and not hardware):
+        if error.option in ("geometry", "lanes") or (error.option == "pipes" and not hardware):
             raise
         if hardware:
             remedy = f"leave out {error.option}, or use software"

@@ -125,6 +125,7 @@ def _lane_lines(design: ShadingPipeline) -> list[str]:
     return [
         f"{lanes} lanes: a beat of o has the next {lanes} pixels of a span, from its first pixel on; "
         "the last beat has the rest"
+        + ("; a beat without a drawn pixel is left out" if design.build.takes_triangles else "")
     ]
 
 
@@ -141,10 +142,21 @@ def _render_header(unit: RendererUnit) -> list[str]:
         *_geometry_lines(unit.geometry),
         *_axes_lines(unit.model),
         *_coarse_lines(unit),
-        "memory_*: a depth for each pixel; read data comes a clock after its place; before a picture's first "
-        "pixel the core writes all ones to every pixel of the picture, a pixel a clock",
+        *_memory_lines(unit.model.design.build.lanes),
         "constants_picture: change it for each picture, to clear the depths as after rst; without a change "
         "triangles add to the picture",
+    ]
+
+
+def _memory_lines(lanes: int) -> list[str]:
+    """Lines about the memory of depths, or about the banks of several lanes."""
+    port, kind, clears = "memory_*", "a depth for each pixel", "a pixel"
+    if lanes > 1:
+        port, kind = "memory_k_*", f"bank k of the depths, for columns with x mod {lanes} = k"
+        clears = "a pixel in each bank"
+    return [
+        f"{port}: {kind}; read data comes a clock after its place; before a picture's first "
+        f"pixel the core writes all ones to every pixel of the picture, {clears} a clock",
     ]
 
 

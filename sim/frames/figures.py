@@ -88,6 +88,7 @@ def triangle_figures(
     return {
         **_figures(scene, design, frame, len(sent.triangles), frame.visible),
         "geometry": "hardware",
+        "lanes": design.build.lanes,
         "setups": design.build.setups,
         "coarse": design.build.coarse is not None,
         "triangle_cycles": frame.input_cycles,

@@ -36,6 +36,7 @@ __all__ = [
     "sample_constants",
     "sample_material",
     "sample_textures",
+    "single_pixels",
 ]
 
 
@@ -129,8 +130,14 @@ def _in_order(beats: np.ndarray, y: np.ndarray) -> np.ndarray:
     return ordered
 
 
-def _single_pixels(beats: np.ndarray) -> np.ndarray:
-    """Pixels of beats of a pipeline with several lanes, in their order."""
+def single_pixels(beats: np.ndarray) -> np.ndarray:
+    """Places and colours of the pixels in beats of several lanes, in their order.
+
+    Parameters
+    ----------
+    beats : structured array
+        Output beats of a pipeline or of a `RendererUnit`, with the fields of `beat_shape`.
+    """
     lanes = beats["colors"].shape[1]
     lane = np.arange(lanes)
     present = (beats["present"][:, np.newaxis] >> lane & 1).astype(bool)
@@ -201,7 +208,7 @@ class FrameSimulator:
             **options,
         )
         if self._lanes > 1:
-            return run, _single_pixels(run.beats)
+            return run, single_pixels(run.beats)
         return run, run.beats if self._pipes == 1 else _in_order(run.beats, y)
 
     def render(

@@ -60,7 +60,15 @@ def _plan(unit: Any, tables: dict[str, Table]) -> dict[str, Any]:
     }
     # On its own ports a core does not tell when its last hidden triangles have passed.
     settle = 4096 if "memory" in unit.signature.members and unit is core else 64
-    return {"memory": "memory" in core.signature.members, "settle": settle, "tables": listed}
+    return {"memories": _memories(core), "settle": settle, "tables": listed}
+
+
+def _memories(core: Any) -> list[str]:
+    """Beginnings of the ports of each memory of depths."""
+    member = core.signature.members.get("memory", None)
+    if member is None:
+        return []
+    return [f"memory_{bank}" for bank in range(*member.dimensions)] if member.dimensions else ["memory"]
 
 
 def _csv(table: Table) -> str:

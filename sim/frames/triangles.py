@@ -27,7 +27,7 @@ from blysk.hdl.geometry.vertex_sort import WAITING_TRIANGLES
 from blysk.hdl.render import STATUS, RendererUnit, waiting_spans
 from blysk.sim.engines.engine import SimulationError
 from blysk.sim.engines.simulate import simulate
-from blysk.sim.frames.frame import sample_constants
+from blysk.sim.frames.frame import sample_constants, single_pixels
 
 __all__ = [
     "LARGEST_PICTURE",
@@ -228,7 +228,7 @@ class TriangleSimulator:
         run = simulate(
             self._unit,
             triangles.beats,
-            count=len(expected.x),
+            count=len(expected.beats["x"]),
             constants=self._constants(frame),
             write=writes_of(constants),
             engine=self.engine,
@@ -303,9 +303,9 @@ class TriangleSimulator:
             idle_timeout=self._longest_silence(sent),
         )
         counts = {name: int(run.status[name]) for name in STATUS}
-        if counts["pixels"] - counts["hidden"] != len(run.beats):
+        beats = run.beats if self.renderer.design.build.lanes == 1 else single_pixels(run.beats)
+        if counts["pixels"] - counts["hidden"] != len(beats):
             raise SimulationError("the hardware's counters and its output differ in the number of pixels")
-        beats = run.beats
         color = np.stack([beats[channel] for channel in "rgb"], axis=-1)
         return SimulatedTriangleFrame(
             image=frame_of_pixels(scene, beats["x"], beats["y"], color, self.renderer.design.transfer),

@@ -42,8 +42,8 @@ class ShortSpansUnit(wiring.Component):
     """The unit with x and z of `BITS` bits, y = 0, exponents 0 and 1, lines ``x + z``, and little room for
     starts and first differences."""
 
-    def __init__(self):
-        self.model = FewBits()
+    def __init__(self, pairs=True):
+        self.model = FewBits(pairs=pairs)
         vector = data.StructLayout({"x": signed(BITS), "z": signed(BITS)})
         span = {"start": vector, "step": vector, "exponent": 1, "length": LENGTH_BITS}
         super().__init__(
@@ -61,8 +61,11 @@ class ShortSpansUnit(wiring.Component):
         for name in ("start", "step"):
             for place, axis in ((0, "x"), (2, "z")):
                 m.d.comb += payload[name][place].as_value().eq(given[name][axis])
-        for line, name in ((payload.line, "start"), (payload.line_step, "step")):
-            m.d.comb += line[0].as_value().eq(given[name].x + given[name].z)
+        if self.model.pairs:
+            for line, name in ((payload.line, "start"), (payload.line_step, "step")):
+                m.d.comb += line[0].as_value().eq(given[name].x + given[name].z)
+        else:
+            m.d.comb += [part.as_value().eq(1) for part in spans.constants[0]]
         m.d.comb += [
             payload.exponent.eq(given.exponent),
             payload.length.eq(given.length),
@@ -82,9 +85,9 @@ class Single:
         self.start, self.step, self.exponent = span.step, span.step, span.exponent
 
 
-def of_spans(*, multiplies=False, shortest=1, longest=6):
+def of_spans(pairs=True, *, multiplies=False, shortest=1, longest=6):
     """A harness for spans of one to three beats. An offered span stays until it is accepted."""
-    h = Harness(unit := ShortSpansUnit(), multiplies=multiplies)
+    h = Harness(unit := ShortSpansUnit(pairs), multiplies=multiplies)
     length = unit.i.payload.length
     h.assume((length >= shortest) & (length <= longest))
     hold_payload(h)
@@ -105,12 +108,12 @@ def words_in(lane, words):
     ).all()
 
 
-def of_words():
+def of_words(pairs=True):
     """Claim that each beat of spans of one to four pixels has the words of this span alone.
 
     The claim includes the bit of the span, and the lane without a pixel.
     """
-    h = of_spans(multiplies=True, longest=4)
+    h = of_spans(pairs, multiplies=True, longest=4)
     unit, before = h.unit, Signal()
     with h.m.If(taken(unit.o)):
         h.m.d.sync += before.eq(unit.o.payload[0].span)
@@ -121,7 +124,7 @@ def of_words():
         # Places of pixels are 0 to 3.
         pixel = Cat(Const(0, 1), place[0]), Cat(Const(1, 1), place[0])
         further = words_in(second, words_of(span, pixel[1]))
-        of_pair = words_in(second, words_of(Single(span), Const(0, 2)))
+        of_pair = words_in(second, words_of(Single(span), Const(0, 2))) if pairs else further
         return Cat(
             words_in(first, words_of(span, pixel[0])),
             (first.span != before) == (place == 0),
@@ -133,12 +136,12 @@ def of_words():
     return h
 
 
-def of_progress():
+def of_progress(pairs):
     """Claim that beats leave while the output is ready, at most as many cycles apart as the latency.
 
     A ready output accepts a span within 14 cycles.
     """
-    h = of_spans()
+    h = of_spans(pairs)
     unit = h.unit
     owed = pixels_follow(h, unit.i, unit.o, beats_of(unit.i.payload), unit.spans.spans_inside * 3)
     answers(h, owed.any(), taken(unit.o), unit.spans.latency, unit.o.ready)
@@ -146,20 +149,26 @@ def of_progress():
     return h
 
 
-def test_words(prove):
+with_and_without_pairs = pytest.mark.parametrize("pairs", [True, False])
+
+
+@with_and_without_pairs
+def test_words(prove, pairs):
     """Within `CYCLES`, for spans of 1 to 4 pixels: each beat leaves once and in order, with its span's
     words."""
-    prove(of_words(), CYCLES)
+    prove(of_words(pairs), CYCLES)
 
 
-def test_progress(prove):
+@with_and_without_pairs
+def test_progress(prove, pairs):
     """Within `CYCLES`: beats leave without a pause longer than the latency, and spans are accepted."""
-    prove(of_progress(), CYCLES)
+    prove(of_progress(pairs), CYCLES)
 
 
-def test_beats_that_wait_stay(prove):
+@with_and_without_pairs
+def test_beats_that_wait_stay(prove, pairs):
     """By induction: a beat that waits does not change."""
-    h = of_spans()
+    h = of_spans(pairs)
     stays(h, h.unit.o)
     prove(h)
 
@@ -186,13 +195,13 @@ def test_bugs_are_found(refute, inject, bug):
     refute(of_words(), CYCLES + 4)
 
 
-def of_waiting():
+def of_waiting(pairs):
     """Claim that second differences do not change while they wait.
 
     They may be taken in the cycle in which the next ones arrive. First differences wait in a FIFO, which has
     its own proof.
     """
-    h = Harness(QuotientLanesUnit(length_bits=LENGTH_BITS))
+    h = Harness(QuotientLanesUnit(QuotientLanes(pairs=pairs), LENGTH_BITS))
     waits, word = h.register("second_waits"), Value.cast(h.register("second"))
     waited, before = Signal(), Signal(len(word))
     h.m.d.sync += [waited.eq(waits), before.eq(word)]
@@ -200,6 +209,7 @@ def of_waiting():
     return h
 
 
-def test_differences_that_wait_stay(prove):
+@with_and_without_pairs
+def test_differences_that_wait_stay(prove, pairs):
     """By induction, for the whole unit: no second differences are overwritten before they are taken."""
-    prove(of_waiting())
+    prove(of_waiting(pairs))

@@ -35,6 +35,7 @@ FURTHER = {
     "power": ("sequential",),
     "quadratic_evaluator": ("horner",),
     "quotient": ("interval 3",),
+    "quotient_lanes": ("N.H, no pairs",),
     "recurrence": ("direct", "reinsch, interleaved"),
     "specular": ("cosquad, interval 3",),
 }

@@ -38,7 +38,7 @@ def test_unknown_values(options, message):
         ("pipes", {"pipes": 4, "bus": "axi"}),
         ("lanes", {"lanes": 2, "pipes": 2}),
         ("lanes", {"lanes": 2, "bus": "axi"}),
-        ("lanes", {"lanes": 2, "top": "render"}),
+        ("lanes", {"lanes": 2, "top": "geometry"}),
         ("lanes", {"lanes": 2, "style": "compact"}),
         ("merged", {"merged": True}),
         ("setups", {"setups": 2}),

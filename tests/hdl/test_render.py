@@ -29,6 +29,10 @@ UNITS = {
     "geometry, two lanes": ("geometry", partial(GeometryUnit, build=Build(top="geometry", setups=2))),
     "geometry, compact": ("geometry", partial(GeometryUnit, build=Build("compact"))),
     "render": ("render", partial(RendererUnit, Renderer(DESIGN), (32, 24))),
+    "render, two lanes": (
+        "render",
+        partial(RendererUnit, Renderer(DESIGN.built(top="render", lanes=2)), (32, 24)),
+    ),
     "render, compact": ("render", partial(RendererUnit, Renderer(COMPACT), (32, 24))),
 }
 

@@ -23,6 +23,7 @@ CASES = {
     ("geometry", "compact"): 60,
     ("render", "quotient"): 60,
     ("render", "quotient, compact"): 60,
+    ("render", "quotient, 2 lanes"): 60,
     ("pixel_pipelines", "2 pipelines, without lights"): 200,
     ("pipeline", "compact"): 40,
 }
@@ -40,8 +41,8 @@ CLOCKED = (
 
 QUICK = ("pipeline", "linear, cosquad")
 
-PICTURE = (32 * 24,)
-"""Words of the memory of depths in the record of `render`."""
+PICTURE = (32 * 24, 16 * 24)
+"""Words of the memory of depths in the record of `render`, and of a bank with two lanes."""
 
 
 @pytest.mark.skipif(missing_tool("icarus") is not None, reason=str(missing_tool("icarus")))

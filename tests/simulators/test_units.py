@@ -48,7 +48,7 @@ UNITS = [
     if simulator == "icarus" or (variant == record.default and name in WHOLE)
 ]
 
-WITH_DEPTHS = ("depth_tester", "render")
+WITH_DEPTHS = ("depth_tester", "depth_lanes", "render")
 """Units whose record has a memory of depths inside. Its zeros stand for a picture that was cleared."""
 
 

@@ -21,7 +21,12 @@ __all__ = ["RECORD", "vectors_with_pairs"]
 
 
 def vectors_with_pairs(rng: np.random.Generator, model: QuotientSpans, length: np.ndarray) -> SpanVectors:
-    """Vectors as of `any_vectors`, in which a span of two pixels is a pair with an exponent of any value."""
+    """Vectors as of `any_vectors`, in which a span of two pixels is a pair with an exponent of any value.
+
+    Without pairs a span of two pixels is a part of a span of three pixels.
+    """
+    if isinstance(model, QuotientLanes) and not model.pairs:
+        return any_vectors(rng, model, np.where(length == 2, 3, length))
     vectors, pair = any_vectors(rng, model, length), length == 2
     second = any_vectors(rng, model, np.ones(np.count_nonzero(pair), dtype=np.int64))
     vectors.step[pair] = second.start
@@ -32,7 +37,7 @@ def vectors_with_pairs(rng: np.random.Generator, model: QuotientSpans, length: n
 def _expect(unit, case):
     beats = case.beats
     vectors = SpanVectors(*(beats.get(name) for name in SpanVectors._fields))
-    pixels = unit.model.compute(vectors, beats["length"])
+    pixels = unit.model.compute(vectors, beats["length"], case.constants)
     words, present, span = unit.model.beats(pixels, beats["length"])
     found = np.zeros(len(span), dtype_of(unit.o.payload.shape()))
     found["rest"], found["line"] = words.rest.codes, words.line.codes
@@ -77,6 +82,16 @@ RECORD = Record(
         "2 lights": Variant(partial(QuotientLanesUnit, QuotientLanes(2), 9), long=True),
         "2 lights, no highlights": Variant(
             partial(QuotientLanesUnit, QuotientLanes(2, highlights=False)), long=True
+        ),
+        "N.H, no pairs": Variant(partial(QuotientLanesUnit, QuotientLanes(pairs=False))),
+        "R.V, no pairs": Variant(
+            partial(QuotientLanesUnit, QuotientLanes(mirror=True, pairs=False)), long=True
+        ),
+        "2 lights, no pairs": Variant(
+            partial(QuotientLanesUnit, QuotientLanes(2, pairs=False), 9), long=True
+        ),
+        "2 lights, no highlights, no pairs": Variant(
+            partial(QuotientLanesUnit, QuotientLanes(2, highlights=False, pairs=False)), long=True
         ),
     },
     expect=_expect,

@@ -163,38 +163,41 @@ class Access:
 
 
 class Memory:
-    """Memory of depths at the ports ``memory_*``. The word of a read comes a cycle later.
+    """Memory of depths at the ports with a name in front. The word of a read comes a cycle later.
 
     A place that the core has not written has a random depth.
     """
 
     done = True
 
-    def __init__(self, dut):
-        self.dut, self.words, self.read = dut, {}, 0
+    def __init__(self, dut, name):
+        self.dut, self.name, self.words, self.read = dut, name, {}, 0
+        self.given = getattr(dut, f"{name}_read_data")
 
     def rest(self):
         """Give any word."""
-        self.dut.memory_read_data.value = 0
+        self.given.value = 0
 
     def drive(self):
         """Give the word of the last read. Called half a cycle before the rising edge."""
-        self.dut.memory_read_data.value = self.read
+        self.given.value = self.read
 
     def observe(self):
         """Read and write at the edge. Called when the outputs have settled."""
-        enables = sample(self.dut, ["memory_read_enable", "memory_write_enable"])
-        if enables["memory_read_enable"]:
+        ports = "read_enable", "write_enable", "write_data"
+        reads, writes, data = (f"{self.name}_{port}" for port in ports)
+        enables = sample(self.dut, [reads, writes])
+        if enables[reads]:
             self.read = self.words.get(self.place("read"), random.getrandbits(24))
-        if enables["memory_write_enable"]:
+        if enables[writes]:
             place = self.place("write")
-            self.words[place] = sample(self.dut, ["memory_write_data"])["memory_write_data"]
-            assert None not in place, "memory_write_place is undefined"
-        return bool(enables["memory_write_enable"])
+            self.words[place] = sample(self.dut, [data])[data]
+            assert None not in place, f"{self.name}_write_place is undefined"
+        return bool(enables[writes])
 
     def place(self, side):
         """Column and row. ``None`` if undefined: then the word of a read does not count."""
-        values = [getattr(self.dut, f"memory_{side}_place_{axis}").value for axis in "xy"]
+        values = [getattr(self.dut, f"{self.name}_{side}_place_{axis}").value for axis in "xy"]
         return tuple(int(value) if value.is_resolvable else None for value in values)
 
 
@@ -234,7 +237,7 @@ async def every_beat(dut, pauses):
         elif plan["kind"] == "set":
             for port, code in read(name)[0].items():
                 getattr(dut, port).value = code
-    memories = [Memory(dut)] if PLAN["memory"] else []
+    memories = [Memory(dut, name) for name in PLAN["memories"]]
     for part in [*(part for parts in phases.values() for part in parts), *memories]:
         part.rest()
     dut.rst.value = 1

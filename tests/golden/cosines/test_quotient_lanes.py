@@ -34,6 +34,18 @@ def test_each_pixel_of_a_pair_is_a_span():
         assert np.array_equal(pixels.rest.codes[place::2], alone.rest.codes)
 
 
+def test_without_pairs_words_are_those_of_one_lane():
+    """Spans of geometry bring no lines, and a span of two pixels has a step."""
+    rng, model = np.random.default_rng(3), QuotientLanes(pairs=False)
+    length = rng.integers(1, 6, 300)
+    vectors, direction = vectors_with_pairs(rng, model, length), line_directions(rng, 1)
+    assert vectors.step[length == 2].any(axis=1).all()
+    assert model.with_lines(vectors, direction) is vectors
+    found, single = (each.compute(vectors, length, direction) for each in (model, QuotientSpans()))
+    for name in ("numerator", "rest", "line"):
+        assert np.array_equal(getattr(found, name).codes, getattr(single, name).codes)
+
+
 def test_pixels_of_beats():
     index, present, span = pixels_of_beats(np.array([3, 0, 2, 1]), 2)
     assert index.tolist() == [[0, 1], [2, 2], [3, 4], [5, 5]]

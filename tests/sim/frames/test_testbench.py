@@ -132,6 +132,15 @@ def test_columns_are_the_ports_of_every_core(top, bus):
     check_columns(preset("linear", "cosquad").built(top=top, bus=bus, stream=None if bus == "native" else 64))
 
 
+def test_columns_of_two_lanes():
+    """Beats have the ports of both lanes, and each bank of depths has ports of its own."""
+    design = preset().built(top="render", lanes=2)
+    check_columns(design)
+    ports = port_widths(core_of(design))
+    assert {f"memory_{bank}_read_data" for bank in range(2)} < ports.keys()
+    assert abs(ports["memory_1_write_place_x"]) == 11
+
+
 def test_frame_shows_every_light_and_material():
     """Pixels change with each light and material. One span is empty."""
     design = preset("quadratic", "cosquad", lights=3, materials=4)
