@@ -78,15 +78,15 @@ def _product(matrices: np.ndarray) -> np.ndarray:
     return matrices[0]
 
 
-def beat_cycles(length: np.ndarray, lanes: int) -> int:
+def beat_cycles(length: np.ndarray, lanes: int, pairs: bool = True) -> int:
     """Cycles from the first beat of a sequence of spans to the last beat, of `QuotientLanesUnit`.
 
     Span k has b_k beats, and its start is taken in cycle s_k. Its turns begin in cycle t_k. Spans of two
     pixels or more have differences. Let p be the span with differences before span k, and f_p the cycle in
     which its first differences are taken.
 
-    - The last turn of span k is in ``g_k = t_k`` if it has one or two pixels, else in ``g_k = t_k + 1``. Then
-      ``t_(k+1) = g_k + 1``.
+    - The last turn of span k is in ``g_k = t_k`` if it has one pixel or is a pair, else in ``g_k = t_k + 1``.
+      Then ``t_(k+1) = g_k + 1``.
     - ``f_k = max(g_k + 5, s_p + b_p - 1)``
     - ``s_k = max(s_(k-1) + b_(k-1), g_k + 5, f_k + 1)``
     - `QuotientLanesUnit.DEPTH` limits the starts that wait: ``t_k >= s_(k-14) - 1``.
@@ -97,6 +97,8 @@ def beat_cycles(length: np.ndarray, lanes: int) -> int:
         Pixels of each span, 1 or more.
     lanes : int
         Pixels of a beat.
+    pairs : bool
+        Whether spans of two pixels are pairs, see `QuotientLanes`.
     """
     waiting = QuotientLanesUnit.DEPTH - 2
     starts: list[int] = []
@@ -104,7 +106,7 @@ def beat_cycles(length: np.ndarray, lanes: int) -> int:
     for pixels, beats in zip(length.tolist(), (-(-length // lanes)).tolist(), strict=True):
         if len(starts) >= waiting:
             turn = max(turn, starts[-waiting] - 1)
-        last = turn + (pixels > 2)
+        last = turn + (pixels > (2 if pairs else 1))
         start = max(free, last + 5)
         if pixels > 1:
             taken = max(last + 5, room)

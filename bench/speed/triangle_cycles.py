@@ -25,7 +25,12 @@ _SPAN = 20
 
 
 def triangle_cycles(
-    geometry: Geometry, triangles: Triangles, frame: FrameSettings, setups: int = 1, interval: int = 16
+    geometry: Geometry,
+    triangles: Triangles,
+    frame: FrameSettings,
+    setups: int = 1,
+    interval: int = 16,
+    lanes: int = 1,
 ) -> int:
     """Cycles of a frame in the throughput style, from the first triangle to the last pixel.
 
@@ -46,10 +51,14 @@ def triangle_cycles(
         Lanes of triangle setup.
     interval : int
         Least cycles from a triangle to the next in a lane.
+    lanes : int
+        Pixels of a beat of the shading. With several lanes a span of two pixels or more takes at least two
+        cycles.
     """
     waiting = waiting_spans(Build(top="render", setups=setups))
     drawn, rows, owner, _ = geometry.rows(triangles, frame)
     length = rows.length.tolist()
+    shading = np.maximum(-(-rows.length // lanes), np.minimum(rows.length, min(lanes, 2))).tolist()
     ends = np.searchsorted(owner, np.arange(len(drawn)), side="right").tolist()
     # Cycle in which each drawn triangle would come to the sort if the sort never waited.
     cycles = VertexSort(geometry.grid).cycles(triangles)
@@ -81,7 +90,7 @@ def triangle_cycles(
                 if len(shaded) >= waiting:
                     now = max(now, shaded[-waiting])
                 shaded.append(max(now + _SPAN, done))
-                done = shaded[-1] + pixels
+                done = shaded[-1] + shading[row]
             now += max(1, (pixels - 1).bit_length() if pixels else 1)
             row += 1
         # The planes of the next triangle are read for a cycle.

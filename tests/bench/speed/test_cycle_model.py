@@ -4,8 +4,13 @@ import numpy as np
 import pytest
 
 from blysk.bench.accuracy import model_of
-from blysk.bench.speed.cycle_model import WAITING, compare, span_cycles
+from blysk.bench.speed.cycle_model import WAITING, beat_cycles, compare, span_cycles
+from blysk.bench.units.cosines.quotient_lanes import vectors_with_pairs
+from blysk.bench.units.cosines.quotient_spans import line_directions, vector_case
+from blysk.golden.cosines.quotient_lanes import QuotientLanes
 from blysk.golden.presets import preset
+from blysk.hdl.cosines.quotient_lanes import QuotientLanesUnit
+from blysk.sim.engines.simulate import simulate
 
 
 def looped(length, interval, waiting):
@@ -43,3 +48,17 @@ def test_frames_of_two_lanes(triangles):
     """The recurrence of two lanes, for long and for short spans."""
     simulated, modelled = compare(preset().built(lanes=2), triangles, (160, 120))
     assert abs(modelled - simulated) <= 0.002 * simulated
+
+
+@pytest.mark.long
+def test_spans_without_pairs():
+    """Short spans of geometry, at the pace of the setup and at that of the beats."""
+    rng, unit = np.random.default_rng(4), QuotientLanesUnit(QuotientLanes(pairs=False))
+    for longest in (2, 3, 9):
+        length = rng.integers(1, longest + 1, 1000)
+        vectors = vectors_with_pairs(rng, unit.model, length)
+        case = vector_case(unit, vectors, length, line_directions(rng, 1))
+        count = int((-(-length // 2)).sum())
+        run = simulate(unit, case.beats, count=count, engine="auto", **case.sent)
+        cycles = int(run.cycles[-1] - run.cycles[0]) + 1
+        assert abs(beat_cycles(length, 2, pairs=False) - cycles) <= 2

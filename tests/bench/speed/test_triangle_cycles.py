@@ -19,3 +19,16 @@ def test_small_triangles():
         sent = frame.sent
         cycles = triangle_cycles(simulator.renderer.geometry, sent.triangles, sent.frame, lanes)
         assert 0.95 * frame.cycles < cycles <= frame.cycles
+
+
+@pytest.mark.long
+def test_two_pixels_a_cycle():
+    """The model of two lanes of shading is within 1 % of the simulation, for long and for short spans."""
+    size, lanes = (320, 240), 2
+    renderer = Renderer(design().built(top="render", lanes=lanes, setups=4))
+    simulator = TriangleSimulator(renderer, size)
+    for triangles in (200, 3000):
+        frame = simulator.render(scene("teapot", size=size, triangles=triangles))
+        sent = frame.sent.triangles, frame.sent.frame
+        cycles = triangle_cycles(renderer.geometry, *sent, setups=4, lanes=lanes)
+        assert abs(cycles - frame.cycles) < 0.01 * frame.cycles

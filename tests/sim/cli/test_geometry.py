@@ -114,6 +114,22 @@ def test_verilog():
 
 
 @pytest.mark.long
+def test_verilog_of_two_lanes(capsys):
+    """Beats have two pixels, depths are in two memories, and L is read. Geometry alone has no lanes."""
+    assert main(["verilog", *HARDWARE, "--lanes", "2", "-o", "a.v"]) == 0
+    header = Path("a.v").read_text().split("module blysk (", 1)[0]
+    for port in ("o_present", "o_colors_1_b", "o_depths_1", "memory_0_read_data", "memory_1_write_place_x"):
+        assert f"// {port} " in header
+    assert "// o_depth " not in header
+    assert "constants: as L write sin a, 0, cos a" in header
+    capsys.readouterr()
+    assert main(["verilog", "--top", "geometry", "--lanes", "2"]) == 2
+    assert capsys.readouterr().err.endswith(
+        "--lanes 2: geometry gives spans, and no pixels; leave out lanes\n"
+    )
+
+
+@pytest.mark.long
 def test_same_from_python(capsys):
     """Functions of the package give the same frame and Verilog, here of lines without a normaliser."""
     assert main(["render", *SMALL, *HARDWARE, "-o", "a.png", "--json", "a.json"]) == 0
