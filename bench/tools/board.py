@@ -124,7 +124,7 @@ def bitstream_of(board: Board, gpu: Gpu, plan: ClockPlan, seeds: int) -> Built:
     """The bitstream of a drawing, made by `build`. The steps are shown."""
     rates = {name: float(rate) / 1e6 for name, rate in plan.rates.items()}
     carried = carried_of(board, gpu, plan)
-    with steps() as show_step:
+    with steps(repeat=False) as show_step:
         top = BoardTop(board, GpuUnit(gpu), plan)
         return build(board, top, rates, seeds, show_step, carried)
 

@@ -11,15 +11,13 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 
 from blysk.hdl.emit.processes import Process
+from blysk.sim.cli.progress import TOLD, elapsed
 from blysk.sim.engines.engine import SimulationError
 
 __all__ = ["MOUNT", "GivenUp", "TooLarge", "ToolError", "ToolRunner", "Watch"]
 
 _SECONDS = 5
 """Seconds between two readings of a tool's output."""
-
-_TOLD = 30
-"""Seconds between two lines of a `Watch`."""
 
 _ROUND = re.compile(r"^Info:\s+iter=(\d+) wires=\d+ overused=(\d+)", re.MULTILINE)
 """A round of the router in nextpnr's log, and the number of wires that are used twice."""
@@ -66,7 +64,7 @@ class Watch:
     def __call__(self, said: str) -> str:
         """Judge the output so far. Returns the reason to give the tool up, or an empty text."""
         now = time.monotonic()
-        if now - self._told >= _TOLD:
+        if now - self._told >= TOLD:
             self._told = now
             rounds = [
                 *(
@@ -75,8 +73,7 @@ class Watch:
                 ),
                 *(f"round {number}, {wires} wires used twice" for number, wires in _ROUND.findall(said)),
             ]
-            passed = f"{int(now - self._begin) // 60}:{int(now - self._begin) % 60:02} min"
-            self._tell(f"{self._step}: {', '.join([*rounds[-1:], passed])}")
+            self._tell(f"{self._step}: {', '.join([*rounds[-1:], elapsed(self._begin)])}")
         return self._stuck(said)
 
 

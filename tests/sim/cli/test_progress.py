@@ -41,6 +41,23 @@ def test_late_steps(capsys, monkeypatch):
         assert capsys.readouterr() == ("", shown)
 
 
+def test_a_long_step_is_told_again(capsys, monkeypatch):
+    """With its own time, until the work ends."""
+    monkeypatch.setattr(progress, "TOLD", 0.1)
+    with progress.steps() as show:
+        time.sleep(0.25)
+        show("writing")
+        time.sleep(0.25)
+    time.sleep(0.2)
+    lines = capsys.readouterr().err.splitlines()
+    assert lines[0] == "blysk: writing"
+    assert 1 <= lines[1:].count("blysk: writing: 0:00 min") == len(lines) - 1 <= 3
+    with progress.steps(repeat=False) as show:
+        show("mapping")
+        time.sleep(0.2)
+    assert capsys.readouterr().err == "blysk: mapping\n"
+
+
 def test_unknown_total(capsys, monkeypatch):
     """The number of pixels is known only when the simulation runs."""
     monkeypatch.setattr(progress, "SECONDS", 0)
