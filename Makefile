@@ -122,12 +122,12 @@ release: $(VENV)/.installed-release
 	mv build/SHA256SUMS build/dist
 	mv build/dist dist
 
-# Measures the sections of the report that the paper takes, with pictures of full size; this takes hours.
+# Measures the sections of the report that the paper takes, with pictures of full size and committed clock rates.
 # PAPER_OPTIONS=--quick takes small pictures, in minutes.
 paper: $(VENV)/.installed-bench
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check -e '.[paper]'
 	mkdir -p build/paper
-	$(BIN)/blysk bench build/paper/report --only points --only rivals $(PAPER_OPTIONS)
+	$(BIN)/blysk bench build/paper/report --only points --only rivals --committed-rates $(PAPER_OPTIONS)
 	$(BIN)/python -m blysk.bench.quality.paper build/paper/report/report.json
 
 lint: style types

@@ -55,6 +55,12 @@ class _Name(click.ParamType):
     help=f"Write only this section: {', '.join(sections.SECTIONS)}. Repeat for more.",
 )
 @click.option(
+    "--committed-rates",
+    "committed",
+    is_flag=True,
+    help="Take the committed clock rates. A full report otherwise places and routes designs for hours.",
+)
+@click.option(
     "--jobs",
     type=Whole(1, 64),
     help="Processes, with up to 1 GB each. Measurements of time run alone.  [default: number of cores]",
@@ -66,7 +72,7 @@ class _Name(click.ParamType):
     help="Dask scheduler, tcp://host:8786. Its workers measure everything but times; this machine measures "
     "times.",
 )
-def command(folder, quick, meshes, names, jobs, address):
+def command(folder, quick, meshes, names, committed, jobs, address):
     """Measure error against run time and all other figures of the report, and write the report into FOLDER.
 
     The default FOLDER is report. The command makes it, or replaces an earlier report in it. The page
@@ -90,7 +96,7 @@ def command(folder, quick, meshes, names, jobs, address):
     check_folder(folder)
     environment()
     names = [name for name in sections.SECTIONS if name in names or not names]
-    chosen = chosen_tasks(quick, meshes, names)
+    chosen = chosen_tasks(quick, meshes, names, places=not committed)
     with resumable(sum(len(own) for _, own in chosen), "measurements") as count:
         made = measured(chosen, jobs or processors(), count, address)
         write_report(folder, made, about(quick, meshes, names) | {"cluster": address})

@@ -231,7 +231,7 @@ def measure_all(
 
 
 def chosen_tasks(
-    quick: bool, meshes: Sequence[str] = (), names: Sequence[str] | None = None
+    quick: bool, meshes: Sequence[str] = (), names: Sequence[str] | None = None, places: bool = True
 ) -> list[tuple[ModuleType, list[Task]]]:
     """Sections to measure, in the order of the page, with their tasks.
 
@@ -241,17 +241,24 @@ def chosen_tasks(
         As in `about`.
     names : sequence of str, optional
         Names of the sections, by default all.
+    places : bool
+        Whether a full report places and routes designs. Otherwise it has the committed clock rates.
 
     Raises
     ------
     InputError
         If a mesh cannot be read.
     """
+    # The tools that it imports take a second, which `--help` does not wait for.
+    from blysk.bench.report.place_and_route import measure as placing
+
     chosen = []
     for name in sections.SECTIONS:
         if names is None or name in names:
             module = sections.load(name)
-            chosen.append((module, module.tasks(quick, **({"meshes": meshes} if name == "points" else {}))))
+            tasks = module.tasks(quick, **({"meshes": meshes} if name == "points" else {}))
+            kept = [task for task in tasks if places or task.function is not placing]
+            chosen.append((module, kept))
     return chosen
 
 

@@ -344,6 +344,18 @@ def test_sections_have_tasks(name):
         assert len(keys) == len(tasks)
 
 
+def test_committed_rates_place_nothing():
+    placing = load("place-and-route").measure
+    names = ["points", "place-and-route"]
+    every, kept = (
+        [tasks for _, tasks in report.chosen_tasks(False, names=names, places=places)]
+        for places in (True, False)
+    )
+    assert all(task.function is placing for task in every[1])
+    assert every[1]
+    assert kept == [[task for task in every[0] if task.function is not placing], []]
+
+
 @pytest.mark.long
 def test_quick_report(quick_report):
     figures = json.loads((quick_report / "report.json").read_text())
