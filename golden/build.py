@@ -32,7 +32,7 @@ STYLES: tuple[Style, ...] = ("throughput", "compact")
 PIPES = (1, 2, 4, 8)
 """Numbers of shading pipelines."""
 
-LANES = (1, 2)
+LANES = (1, 2, 4)
 """Numbers of lanes of a shading pipeline: pixels in a beat."""
 
 SETUPS = (1, 2, 4)
@@ -89,9 +89,9 @@ class Build:
         largest number of all.
     exponent : int or None
         Specular exponent, fixed at build time; ``None``: the exponent is a frame constant.
-    lanes : {1, 2}
-        Lanes of a pipeline. With two lanes an output beat has two neighbouring pixels of a span. Only the
-        method ``quotient`` serves them.
+    lanes : {1, 2, 4}
+        Lanes of a pipeline. With N lanes an output beat has up to N neighbouring pixels of a span. Only the
+        method ``quotient`` serves several lanes.
     pipes : {1, 2, 4, 8}
         Number of pipelines, see `PixelPipelines`.
     merged : bool
@@ -174,6 +174,11 @@ class Build:
         for excludes, reason, remedy in (
             (self.compact, "a pixel of the compact style takes several cycles", "use the throughput style"),
             (self.top == "geometry", "geometry gives spans, and no pixels", "leave out lanes"),
+            (
+                self.takes_triangles and self.lanes > 2,
+                "the depth test takes at most two pixels a cycle",
+                "take two lanes, or use spans",
+            ),
             (self.pipes > 1, "several pipelines give single pixels", "leave out lanes or pipes"),
             (self.bus != "native", f"a core on {self.bus} gives single pixels", "leave out lanes or bus"),
         ):

@@ -112,9 +112,10 @@ class ShadingPipelineUnit(wiring.Component):
     of its span, or the pixel waits for the decision. So a method with a shorter setup than the gate, such as
     ``linear``, may take a cycle more for short spans.
 
-    With two lanes a beat of ``o`` has two neighbouring pixels of a span, see `beat_shape`. The interpolator
-    makes the operands of both pixels, and each lane has units of its own from there to the colours. In the
-    rules above beats take the place of pixels. A span of two pixels is a pair, see `QuotientLanesUnit`.
+    With two or four lanes a beat of ``o`` has as many neighbouring pixels of a span, see `beat_shape`. The
+    interpolator makes the operands of all pixels, and each lane has units of its own from there to the
+    colours. In the rules above beats take the place of pixels. A span of two pixels is a pair, see
+    `QuotientLanesUnit`. With four lanes a beat of three or four pixels takes two cycles if it is a span.
 
     Without lights there is neither interpolator nor multiplier. Every pixel has the ambient colour.
 

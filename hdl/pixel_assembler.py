@@ -1,6 +1,6 @@
 """Pixel assembler: gives each shaded colour its coordinates."""
 
-from amaranth.hdl import Cat, Module, Mux, Signal, Value, unsigned
+from amaranth.hdl import Cat, Const, Module, Mux, Signal, Value, unsigned
 from amaranth.lib import data, stream, wiring
 from amaranth.lib.wiring import In, Out
 
@@ -50,18 +50,18 @@ class PixelAssemblerUnit(wiring.Component):
     coordinates came a cycle before. Coordinates may come long before their colours. The unit has no
     multipliers.
 
-    With two lanes a beat of colours leaves as a beat of pixels, see `beat_shape`. The first beat begins at
-    the first pixel of the span, at an even or an odd column. Beats that begin at even columns would suit the
-    words of a frame buffer. But a span would then take a further beat if it begins at an odd column and has
-    an even number of pixels. Short spans would lose a large part of the gain. A frame buffer of two banks,
-    for even and for odd columns, writes each beat in one cycle.
+    With several lanes a beat of colours leaves as a beat of pixels, see `beat_shape`. The first beat begins
+    at the first pixel of the span, at any column. With two lanes beats that begin at even columns would suit
+    the words of a frame buffer. But a span would then take a further beat if it begins at an odd column and
+    has an even number of pixels. Short spans would lose a large part of the gain. With N lanes a frame buffer
+    of N banks, with column x in bank x mod N, writes each beat in one cycle.
 
     Parameters
     ----------
     x_bits, y_bits, length_bits : int
         Bits of the coordinates and of a span's length.
     lanes : int
-        Pixels of a beat, 1 or 2.
+        Pixels of a beat, 1, 2 or 4.
 
     Members
     -------
@@ -105,8 +105,8 @@ class PixelAssemblerUnit(wiring.Component):
         load, moves = Signal(), Signal()
         members, further = {"x": x.shape(), "y": y.shape(), "last": 1}, []
         if self.lanes > 1:
-            active, ends, both = self._count_beats(m, moves)
-            members["both"], further = 1, [both]
+            active, ends, present = self._count_beats(m, moves)
+            members["present"], further = len(present), [present]
         else:
             active, ends = count_down(m, self.coordinates.valid, span.length, moves)
         position = stream.Signature(data.StructLayout(members)).create()
@@ -138,36 +138,42 @@ class PixelAssemblerUnit(wiring.Component):
         """Assignments of the colours of a pixel, or of all lanes."""
         if self.lanes == 1:
             return [pixel[name].eq(color[name]) for name in "rgb"]
-        both = position.both
-        further = Mux(both, Value.cast(color[1]), 0)
-        return [
-            pixel.present.eq(Cat(1, both)),
-            pixel.colors[0].eq(color[0]),
-            Value.cast(pixel.colors[1]).eq(further),
-        ]
+        found = [pixel.present.eq(Cat(1, position.present)), pixel.colors[0].eq(color[0])]
+        for lane in range(1, self.lanes):
+            shown = Mux(position.present[lane - 1], Value.cast(color[lane]), 0)
+            found.append(Value.cast(pixel.colors[lane]).eq(shown))
+        return found
 
     def _count_beats(self, m: Module, advance: Value) -> tuple[Signal, Signal, Signal]:
-        """Count the beats of spans of two lanes, one on each cycle on which ``advance`` is high.
+        """Count the beats of spans of several lanes, one on each cycle on which ``advance`` is high.
 
-        Returns ``active`` and ``ends`` as `count_down` does, and whether the beat has two pixels. All are
-        registers.
+        Returns ``active`` and ``ends`` as `count_down` does, and whether the beat has a pixel in each further
+        lane. All are registers.
         """
-        active, ends, both = Signal(name="active"), Signal(name="ends", init=1), Signal(name="both")
+        lanes = self.lanes
+        active, ends = Signal(name="active"), Signal(name="ends", init=1)
+        present = Signal(lanes - 1, name="present")
         valid, length = self.coordinates.valid, self.coordinates.payload.length
         remaining = Signal(len(length), name="remaining")
+
+        def over(pixels: Value, count: int) -> Value:
+            """Whether there are more pixels than a small number."""
+            bits = count.bit_length()
+            pixels = Cat(pixels, Const(0, bits))
+            return pixels[bits:].any() | pixels[:bits].matches(*range(count + 1, 1 << bits))
+
         with m.If(advance):
             with m.If(ends):
-                over_two = length[2:].any() | length[:2].all()
                 m.d.sync += [
                     active.eq(valid & length.any()),
-                    ends.eq(~(valid & over_two)),
-                    both.eq(length[1:].any()),
+                    ends.eq(~(valid & over(length, lanes))),
+                    present.eq(Cat(over(length, lane) for lane in range(1, lanes))),
                     remaining.eq(length),
                 ]
             with m.Else():
                 m.d.sync += [
-                    ends.eq((remaining == 3) | (remaining == 4)),
-                    both.eq(remaining != 3),
-                    remaining.eq(remaining - 2),
+                    ends.eq(~over(remaining, 2 * lanes)),
+                    present.eq(Cat(over(remaining, lanes + lane) for lane in range(1, lanes))),
+                    remaining.eq(remaining - lanes),
                 ]
-        return active, ends, both
+        return active, ends, present

@@ -33,7 +33,7 @@ _DESIGN = DESIGN | {"transfer": DESIGN["transfer"]._replace(default="linear")}
     type=Choice("family", DEVICES),
     help="Family of FPGAs. "
     + "; ".join(f"{name}: {family.device}" for name, family in DEVICES.items())
-    + ".  [default: ecp5; for several pipelines ecp5-85f]",
+    + ".  [default: ecp5; for several pipelines or four lanes ecp5-85f]",
 )
 @click.option(
     "--device",
@@ -156,7 +156,7 @@ def command(
     else:
         # With --every-method the options are checked with the default method, which serves each core.
         built(design(**chosen), build)
-    several = build.get("pipes", 1) > 1
+    several = build.get("pipes", 1) > 1 or build.get("lanes", 1) > 2
     family = DEVICES[family_name] if family_name else ECP5_85F if several else ECP5
     family = replace(family, target=target)
     from blysk.bench.tools.fpga import about, count_by_unit, pipelines_of, place, units_of

@@ -82,12 +82,14 @@ def beat_cycles(length: np.ndarray, lanes: int, pairs: bool = True) -> int:
     """Cycles from the first beat of a sequence of spans to the last beat, of `QuotientLanesUnit`.
 
     Span k has b_k beats, and its start is taken in cycle s_k. Its turns begin in cycle t_k. Spans of two
-    pixels or more have differences. Let p be the span with differences before span k, and f_p the cycle in
-    which its first differences are taken.
+    pixels or more have first differences. Let p be the span with first differences before span k, and f_p the
+    cycle in which they are taken. Spans of three pixels or more have second differences. Let q be the span
+    with second differences before span k, and e_q the cycle in which they are taken.
 
     - The last turn of span k is in ``g_k = t_k`` if it has one pixel or is a pair, else in ``g_k = t_k + 1``.
       Then ``t_(k+1) = g_k + 1``.
-    - ``f_k = max(g_k + 5, s_p + b_p - 1)``
+    - ``e_k = max(t_k + 5, s_q + b_q - 2, s_q)``, and ``t_k >= e_q - 3``, because one second difference waits.
+    - ``f_k = max(g_k + 5, e_k + 1, s_p + b_p - 1)``. It is ``s_p + 1`` or more if p has second differences.
     - ``s_k = max(s_(k-1) + b_(k-1), g_k + 5, f_k + 1)``
     - `QuotientLanesUnit.DEPTH` limits the starts that wait: ``t_k >= s_(k-14) - 1``.
 
@@ -102,16 +104,21 @@ def beat_cycles(length: np.ndarray, lanes: int, pairs: bool = True) -> int:
     """
     waiting = QuotientLanesUnit.DEPTH - 2
     starts: list[int] = []
-    turn, free, taken, room, first = 0, 0, -8, 0, None
+    turn, free, second, may_second, may_first, first = 0, 0, -8, -8, -8, None
     for pixels, beats in zip(length.tolist(), (-(-length // lanes)).tolist(), strict=True):
         if len(starts) >= waiting:
             turn = max(turn, starts[-waiting] - 1)
-        last = turn + (pixels > (2 if pairs else 1))
+        is_long = pixels > (2 if pairs else 1)
+        if is_long:
+            turn = max(turn, second - 3)
+            second = max(turn + 5, may_second)
+        last = turn + is_long
         start = max(free, last + 5)
         if pixels > 1:
-            taken = max(last + 5, room)
-            start = max(start, taken + 1)
-            room = start + beats - 1
+            start = max(start, last + 6, may_first + 1, second + 2 if is_long else 0)
+            may_first = start + max(beats - 1, is_long)
+        if is_long:
+            may_second = start + max(beats - 2, 0)
         first = start if first is None else first
         starts.append(start)
         turn, free = last + 1, start + beats

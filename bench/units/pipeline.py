@@ -476,7 +476,7 @@ RECORD = Record(
     status=_status,
     stimuli={
         "spans": Stimulus(_spans, 3000, repeats=3),
-        "frames": Stimulus(_frames, 400, variants=(*_ALL, "srgb, without lights", "2 lanes")),
+        "frames": Stimulus(_frames, 400, variants=(*_ALL, "srgb, without lights", "2 lanes", "4 lanes")),
         "setups": Stimulus(_every_setup, 60, stalled=False, variants=_ALL),
         "terminator": Stimulus(_terminator, variants=_BOTH),
         "roundings": Stimulus(_roundings, variants=_BOTH),

@@ -64,7 +64,7 @@ _LONG_AND_SHORT = ((200, 4095), (3000, 12))
 """Number of spans and their largest length, for long and for short spans."""
 
 LANE_DESIGNS: dict[str, ShadingPipeline] = {
-    name: design.built(lanes=2)
+    name: design.built(lanes=int(name[0]))
     for name, design in (
         ("2 lanes", preset()),
         ("2 lanes, phong, srgb, 3 materials", preset(model="phong", materials=3, transfer="srgb")),
@@ -74,6 +74,12 @@ LANE_DESIGNS: dict[str, ShadingPipeline] = {
         ),
         ("2 lanes, 2 lights", preset(lights=2)),
         ("2 lanes, without lights, srgb", preset(lights=0, transfer="srgb")),
+        ("4 lanes", preset()),
+        (
+            "4 lanes, phong, 2 lights, grey, few bits",
+            preset(model="phong", lights=2, grey=True, length_bits=5),
+        ),
+        ("4 lanes, without lights, few bits", preset(lights=0, length_bits=2)),
     )
 }
 """Pipelines with several lanes, by name."""

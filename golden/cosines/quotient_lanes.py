@@ -44,12 +44,12 @@ def separate_pairs(vectors: SpanVectors, length: np.ndarray) -> tuple[SpanVector
 
 @dataclass(frozen=True)
 class QuotientLanes(QuotientSpans):
-    """`QuotientSpans` with two lanes: words of two neighbouring pixels of a span in a beat.
+    """`QuotientSpans` with several lanes: words of neighbouring pixels of a span in a beat.
 
-    The pixels have the same words as with one lane. A beat has the pixels 2 j and 2 j + 1 of a span. A span
-    of two pixels is a *pair*: its step is the vector at the second pixel, and its exponent has no effect.
-    Both vectors of a pair may have scales of their own, so each pixel of a pair has the words of a span of
-    one pixel.
+    The pixels have the same words as with one lane. With N lanes beat j has the pixels N j to N j + N - 1 of
+    a span. A span of two pixels is a *pair*: its step is the vector at the second pixel, and its exponent has
+    no effect. Both vectors of a pair may have scales of their own, so each pixel of a pair has the words of a
+    span of one pixel.
 
     With highlights a span brings its lines, exact l of ``start`` and of ``step``. So the hardware has no
     multiplier for them. The line of a pixel is the same to the bit.
@@ -61,14 +61,14 @@ class QuotientLanes(QuotientSpans):
     lights, highlights, mirror
         Those of `QuotientSpans`.
     lanes : int
-        Number of lanes, 2.
+        Number of lanes, 2 or 4.
     pairs : bool
         Whether spans of two pixels are pairs, and spans bring lines.
 
     Raises
     ------
     ValueError
-        As `QuotientSpans` does, or if the number of lanes is not 2.
+        As `QuotientSpans` does, or if the number of lanes is not 2 or 4.
 
     Source: docs/theory/quotient.md#lanes.
     """
@@ -78,8 +78,8 @@ class QuotientLanes(QuotientSpans):
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        if self.lanes != 2:
-            raise ValueError(f"lanes must be 2, not {self.lanes}")
+        if self.lanes not in (2, 4):
+            raise ValueError(f"lanes must be 2 or 4, not {self.lanes}")
 
     @property
     def brings_lines(self) -> bool:

@@ -25,37 +25,41 @@ def lane_words_shape(model: QuotientLanes) -> data.ArrayLayout:
 
 
 class QuotientLanesUnit(QuotientSpansUnit):
-    """Words of two pixels of a span on a cycle; `QuotientLanes` is the bit-accurate model.
+    """Words of two or four pixels of a span on a cycle; `QuotientLanes` is the bit-accurate model.
 
-    A beat has the next two pixels of a span. The first beat begins at the span's first pixel, at any column.
-    If a span has an odd number of pixels, the last beat has one pixel. A lane without a pixel has words of 0.
+    A beat has the next N pixels of a span. The first beat begins at the span's first pixel, at any column.
+    The last beat has the rest, 1 to N pixels. A lane without a pixel has words of 0.
 
     *Setup.* A span of two pixels is a *pair*: its step is the vector at the second pixel, with any scale of
     its own, and its exponent is not read. So the first differences of a pair are the words of the second
     pixel. There are two multipliers for each squared component. The first of them makes starts. The second
     makes first differences in the same cycle, and second differences in a cycle before. So a span of three
-    pixels or more takes two cycles, and no span takes more cycles than it has beats. Spans bring their lines,
-    which then need no multiplier. First differences wait in a FIFO, second differences in registers.
+    pixels or more takes two cycles. With two lanes no span takes more cycles than it has beats. Spans bring
+    their lines, which then need no multiplier. First differences wait in a FIFO, second differences in
+    registers.
 
     Without pairs a span of two pixels takes two cycles, too. Its words are those of `QuotientSpans`. Each
     line then has two multipliers. They take the step in the first cycle of a span, and the start in the last.
 
-    *Accumulators.* Beat j has the pixels 2 j and 2 j + 1. With ``D1`` and ``D2`` of `QuotientSpans`, three
-    words of each square change from beat to beat:
+    *Accumulators.* Beat j has the pixels ``N j`` to ``N j + N - 1``. With ``D1`` and ``D2`` of
+    `QuotientSpans`, three words of each square change from beat to beat:
 
-    ===================== ================== ============
-    word                  at the first beat  a beat
-    ===================== ================== ============
-    f(2j)                 start              + the step
-    step, f(2j+2) - f(2j) 2 D1 + D2          + 4 D2
-    gap, f(2j+1) - f(2j)  D1                 + 2 D2
-    ===================== ================== ============
+    ===================== ======================= ============
+    word                  at the first beat       a beat
+    ===================== ======================= ============
+    f(Nj)                 start                   + the step
+    step, f(Nj+N) - f(Nj) N D1 + N (N - 1)/2 D2   + N^2 D2
+    gap, f(Nj+1) - f(Nj)  D1                      + N D2
+    ===================== ======================= ============
 
     With a first difference F before the half h of a second difference is added, and b, the last bit of
-    ``D2 = 2 h + b``, the first step is ``2 F + 4 h + b``. So it takes one addition. The step's register has
-    2 F before. Half of this register and h are the first gap, and half of it and ``3 h + 2 b`` the following
-    gaps. So gaps have no accumulators. Differences are taken as in `QuotientSpansUnit`, with beats in place
-    of pixels.
+    ``D2 = 2 h + b``, the first step is ``N F + N^2 h + N (N - 1)/2 b``. So it takes one addition. The step's
+    register has N F before. An N-th of this register and h are the first gap. An N-th of it and
+    ``(N + 1) h + (N/2 + 1) b`` are the following gaps, without the fraction of an N-th. So gaps have no
+    accumulators. Differences are taken as in `QuotientSpansUnit`, with beats in place of pixels.
+
+    With four lanes the gap from lane 1 to lane 2 is the gap and D2. Lane 3 is three of these gaps after lane
+    0. So lanes 2 and 3 take one adder and one register of D2 for this gap, and three adders for their words.
 
     The first beat of a span is on the output `latency` cycles after an empty unit has accepted the span. For
     a span of one pixel these are `short_latency` cycles. Payloads are registers.
@@ -86,6 +90,7 @@ class QuotientLanesUnit(QuotientSpansUnit):
 
     def __init__(self, model: QuotientLanes | None = None, length_bits: int = LENGTH_BITS):
         super().__init__(model or QuotientLanes(), length_bits)
+        self._lane_bits = self.model.lanes.bit_length() - 1
         self.initiation_interval = 2
         self.latency += 1
         self.short_latency += 1
@@ -112,9 +117,9 @@ class QuotientLanesUnit(QuotientSpansUnit):
         Whether there are two pixels or more; whether there are at most one, two, three beats; with pairs
         whether the span is a pair.
         """
-        beats = last[1:]
+        beats = Cat(last[self._lane_bits :], Const(0, 2))
         few = ~beats.any(), ~beats[1:].any(), ~beats[2:].any() & ~beats[:2].all()
-        return Cat(last.any(), *few, *([last[0] & ~beats.any()] if self.model.pairs else []))
+        return Cat(last.any(), *few, *([last[0] & ~last[1:].any()] if self.model.pairs else []))
 
     def _set_up(self, m: Module, second, first, start: stream.Interface) -> None:
         """Turns, products, sums and shifts, up to differences and starts that wait."""
@@ -261,17 +266,19 @@ class QuotientLanesUnit(QuotientSpansUnit):
         # output registers.
         last, two, three = (Signal(name=name, init=1) for name in ("last", "two_left", "three_left"))
         left, valid, shown = (
-            Signal(self.length_bits - 1, name="left"),
+            Signal(max(self.length_bits - self._lane_bits, 2), name="left"),
             Signal(name="valid"),
             Signal(name="shown"),
         )
         # Whether second and first differences of the next span were taken, and whether they may be taken.
         has_second, self._ready = Signal(name="has_second"), Signal(name="ready")
         may_second, may_first = Signal(name="may_second", init=1), Signal(name="may_first")
-        # Whether the last beat of a span has two pixels.
-        even = Signal(name="even")
+        # Whether the last beat of a span has a pixel in each further lane.
+        remain = Signal(self.model.lanes - 1, name="remain")
         takes_differences, one, at_most_two, at_most_three, *pair = self._few
         self._starts_pair = pair[0] if pair else Const(0)
+        final = start.payload.length
+        place = final[: self._lane_bits]
         starts = takes[2] & takes_differences
         starts_three = starts & ~self._starts_pair
         # A span of one or two beats needs no second differences any more when it starts, and a pair no first
@@ -296,34 +303,34 @@ class QuotientLanesUnit(QuotientSpansUnit):
             m.d.sync += [
                 shown.eq(valid),
                 valid.eq(takes[2] | ~last),
-                left.eq(Mux(takes[2], start.payload.length[1:], left - 1)),
+                left.eq(Mux(takes[2], final[self._lane_bits :], left - 1)),
                 Cat(last, two, three, has_second, self._ready).eq(Cat(following)),
                 may_second.eq(following[2] & ~following[3]),
                 may_first.eq(following[1] & ~following[4]),
             ]
             with m.If(takes[2]):
-                m.d.sync += even.eq(start.payload.length[0])
-        self._both = ~last | even
+                m.d.sync += remain.eq(Cat(place >= lane for lane in range(1, self.model.lanes)))
+        self._present = ~last.replicate(len(remain)) | remain
 
     def _accumulate(self, m: Module, moves: Any, takes: Any, words: Any, start: stream.Interface) -> None:
-        """Accumulators of both lanes, from differences and starts that are taken.
+        """Accumulators of all lanes, from differences and starts that are taken.
 
         ``moves`` has three conditions: a beat may leave; the half of a second difference is added; steps of
         squares change.
         """
-        p, (advance, halves, steps), (second, first) = self.model, moves, words
-        takes_second, takes_first, takes_start = takes
+        p, advance, (second, first) = self.model, moves[0], words
+        _, takes_first, takes_start = takes
         is_pair, lanes = Signal(name="pair"), self.o.payload
 
         def show(lane: int, word: Value, result: Any, name: str) -> None:
             """Show a word of a lane on the output, a cycle later."""
             shown = Signal(len(word), name=f"{name}_of_{lane}", reset_less=True)
             with m.If(advance):
-                m.d.sync += shown.eq(word if lane == 0 else Mux(self._both, word, 0))
+                m.d.sync += shown.eq(word if lane == 0 else Mux(self._present[lane - 1], word, 0))
             m.d.comb += Value.cast(result).eq(shown)
 
-        def accumulate(begin: Value, step: Value, gap: Value, results: Any, name: str) -> None:
-            """Accumulate a word, and show it in both lanes."""
+        def accumulate(begin: Value, step: Value, gaps: Any, results: Any, name: str) -> None:
+            """Accumulate a word, and show it in all lanes."""
             value, base = (Signal.like(begin, name=word, reset_less=True) for word in (name, f"{name}_base"))
             words = (value, base) if p.pairs else (value,)
             with m.If(advance):
@@ -331,9 +338,8 @@ class QuotientLanesUnit(QuotientSpansUnit):
                 # The word of the second lane is its base and the gap. The gap of a pair is the whole word.
                 with m.If(takes_start & self._starts_pair):
                     m.d.sync += base.eq(0)
-            base = words[-1]
-            show(0, value, results[0], name)
-            show(1, (base + gap)[: len(value)], results[1], name)
+            for lane, word in enumerate((value, *self._further(words[-1], *gaps))):
+                show(lane, word[: len(value)], results[lane], name)
 
         if p.pairs:
             with m.If(advance & takes_start):
@@ -342,37 +348,13 @@ class QuotientLanesUnit(QuotientSpansUnit):
         loads = Signal(name="loads")
         with m.If(advance):
             m.d.sync += loads.eq(takes_first)
-        for number in range(len(p.squares)):
-            width, free = p.square_format.width, p.square_format.fraction_bits - 34
-            change, whole, gap, gap_change = (
-                Signal(width, name=f"{name}_{number}", reset_less=True)
-                for name in ("change", "whole", "gap", "gap_change")
-            )
-            # The step has a bit more, because the gap is made from its half.
-            step = Signal(width + 1, name=f"step_{number}", reset_less=True)
-            low = Signal(name=f"low_{number}", reset_less=True)
-            given, doubled = second.squares[number], Cat(low, change)[:width]
-            with m.If(advance):
-                # Second differences of a later span may wait in ``change`` while a pair takes its words.
-                with m.If(takes_first & ~self._marks[0]):
-                    m.d.sync += whole.eq(doubled)
-                with m.If(takes_second):
-                    m.d.sync += [change.eq(given[1:]), low.eq(given[0]), whole.eq(0)]
-                with m.Elif(halves):
-                    m.d.sync += change.eq(doubled)
-                with m.If(takes_first | halves):
-                    m.d.sync += gap_change.eq(change + whole + (low & halves))
-                with m.If(takes_first & self._marks[0]):
-                    m.d.sync += gap_change.eq(0)
-                with m.If(loads | ~self._ready):
-                    m.d.sync += gap.eq(step[1:] + gap_change)
-            with m.If(steps | (advance & takes_first)):
-                twice = first.squares[number] << 1
-                m.d.sync += step.eq(Mux(takes_first, twice, step + Cat(low & halves, Const(0, 1), change)))
+        for number, begin in enumerate(start.payload.squares):
+            differences = second.squares[number], first.squares[number]
+            step, *gaps = self._square_steps(m, number, moves, takes, differences, loads)
             of_light = p.highlights and number < p.lights
             results = [lane.numerator[number] if of_light else lane.rest for lane in lanes]
-            begin = Cat(Const(0, free), start.payload.squares[number])
-            accumulate(begin, step[:width], gap, results, f"square_{number}")
+            begin = Cat(Const(0, p.square_format.fraction_bits - 34), begin)
+            accumulate(begin, step, gaps, results, f"square_{number}")
         for light in range(p.lights):
             step, next_step = (
                 Signal(signed(p.LINE_FORMAT.width), name=f"{name}_{light}", reset_less=True)
@@ -384,7 +366,8 @@ class QuotientLanesUnit(QuotientSpansUnit):
                     m.d.sync += next_step.eq(first.lines[light])
                 with m.If(takes_start):
                     m.d.sync += step.eq(next_step)
-            accumulate(begin, step << 1, step, [lane.line[light] for lane in lanes], f"line_{light}")
+            results = [lane.line[light] for lane in lanes]
+            accumulate(begin, step << self._lane_bits, (step, step), results, f"line_{light}")
             if p.takes_heights:
                 given = second.lines[light], start.payload.heights[light]
                 heights = self._heights(m, light, advance, takes, given, is_pair)
@@ -394,12 +377,69 @@ class QuotientLanesUnit(QuotientSpansUnit):
         with m.If(advance & takes_start):
             m.d.sync += span.eq(~span)
         show(0, span, lanes[0].span, "span")
-        show(1, self._both, lanes[1].span, "span")
+        for lane in range(1, p.lanes):
+            show(lane, self._present[lane - 1], lanes[lane].span, "span")
+
+    def _square_steps(
+        self, m: Module, number: int, moves: Any, takes: Any, differences: Any, loads: Value
+    ) -> tuple[Value, Value, Value]:
+        """Step of a square from beat to beat, and its gaps from lane 0 to lane 1 and from lane 1 to 2."""
+        p, bits, (advance, halves, steps), (second, first) = self.model, self._lane_bits, moves, differences
+        takes_second, takes_first, _ = takes
+        width = p.square_format.width
+        change, whole, gap, gap_change = (
+            Signal(width, name=f"{name}_{number}", reset_less=True)
+            for name in ("change", "whole", "gap", "gap_change")
+        )
+        # The step has a few bits more, because the gap is made from a part of it.
+        step, late = Signal(width + bits, name=f"step_{number}", reset_less=True), gap
+        low = Signal(name=f"low_{number}", reset_less=True)
+        doubled = Cat(low, change)[:width]
+        # The first step takes N (N - 1)/2 times the last bit of the second difference.
+        carries = p.lanes * (p.lanes - 1) // 2
+        last_bits = [low & halves if carries >> bit & 1 else Const(0, 1) for bit in range(2 * bits)]
+        with m.If(advance):
+            # Second differences of a later span may wait in ``change`` while a pair takes its words.
+            with m.If(takes_first & ~self._marks[0]):
+                m.d.sync += whole.eq(doubled)
+            with m.If(takes_second):
+                m.d.sync += [change.eq(second[1:]), low.eq(second[0]), whole.eq(0)]
+            with m.Elif(halves):
+                m.d.sync += change.eq(doubled)
+            with m.If(takes_first | halves):
+                m.d.sync += gap_change.eq(change + Cat(Const(0, bits - 1), whole) + (low & halves))
+            with m.If(takes_first & self._marks[0]):
+                m.d.sync += gap_change.eq(0)
+            following = step[bits:] + gap_change
+            with m.If(loads | ~self._ready):
+                m.d.sync += gap.eq(following)
+        if p.lanes > 2:
+            # The gap from lane 1 to lane 2 has a second difference more. It is kept until the next span.
+            kept, late = (
+                Signal(width, name=f"{name}_{number}", reset_less=True) for name in ("kept", "late")
+            )
+            with m.If(advance & takes_first & ~self._marks[0]):
+                m.d.sync += kept.eq(doubled)
+            with m.If(advance & (loads | ~self._ready)):
+                m.d.sync += late.eq(following + kept)
+        with m.If(steps | (advance & takes_first)):
+            all_lanes = first << bits
+            m.d.sync += step.eq(Mux(takes_first, all_lanes, step + Cat(*last_bits, change)))
+        return step[:width], gap, late
+
+    def _further(self, base: Value, gap: Value, late: Value) -> list[Value]:
+        """Words of the further lanes, from the word of lane 0, the gap to lane 1, and the gap from 1 to 2.
+
+        The gaps are ``D1 + 4 j D2`` and ``D1 + (4 j + 1) D2``. Three times the second is ``3 D1 + (12 j + 3)
+        D2``, which is the distance from lane 0 to lane 3.
+        """
+        second = base + gap
+        return [second, second + late, base + late + (late << 1)][: self.model.lanes - 1]
 
     def _heights(
         self, m: Module, light: int, advance: Value, takes: Any, given: Any, is_pair: Value
-    ) -> tuple[Value, Value]:
-        """Signs of z of a light, in both lanes."""
+    ) -> tuple[Value, ...]:
+        """Signs of z of a light, in all lanes."""
         p, (step, start) = self.model, given
         width = p.HEIGHT_FORMAT.width
         height, current, following = (
@@ -419,5 +459,6 @@ class QuotientLanesUnit(QuotientSpansUnit):
                     m.d.sync += sign.eq(next_sign)
             with m.If(takes[2]):
                 m.d.sync += current.eq(following)
-            m.d.sync += height.eq(Mux(takes[2], begin, height + (current << 1)))
-        return height[-1], Mux(is_pair, sign, (height + current)[width - 1])
+            m.d.sync += height.eq(Mux(takes[2], begin, height + (current << self._lane_bits)))
+        second, *others = (word[width - 1] for word in self._further(height, current, current))
+        return height[-1], Mux(is_pair, sign, second), *others

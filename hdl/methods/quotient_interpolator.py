@@ -28,9 +28,9 @@ class QuotientInterpolatorUnit(InterpolatorUnit, model=QuotientInterpolator):
     takes one cycle. A longer span takes at least three cycles. A span is flagged at its first pixel out of
     range.
 
-    With two lanes `QuotientLanesUnit` gives the words of two pixels. Each lane has a `QuotientUnit`. Both
-    have the same handshakes, so they are in the same state on every cycle. With pairs spans bring their
-    lines, so the constants are not read.
+    With several lanes `QuotientLanesUnit` gives the words of all pixels of a beat. Each lane has a
+    `QuotientUnit`. All have the same handshakes, so they are in the same state on every cycle. With pairs
+    spans bring their lines, so the constants are not read.
 
     Parameters
     ----------

@@ -474,7 +474,7 @@ class SharedOptions(TypedDict, total=False):
     """Options of `BUILD` that `RENDERING` has with the same type, by their names in Python."""
 
     geometry: Literal["software", "hardware"]
-    lanes: Literal[1, 2]
+    lanes: Literal[1, 2, 4]
     pipes: Literal[1, 2, 4, 8]
     setups: Literal[1, 2, 4]
 

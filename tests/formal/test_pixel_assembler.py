@@ -1,7 +1,7 @@
 """Proofs of the pixel assembler: every colour gets its position, and every span gets all of its pixels."""
 
 import pytest
-from amaranth.hdl import Cat, Signal
+from amaranth.hdl import Cat, Const, Signal, Value
 
 from blysk.hdl.pixel_assembler import PixelAssemblerUnit
 
@@ -29,6 +29,26 @@ def of_waiting_spans():
     h.m.d.sync += spans.eq(spans + taken(unit.coordinates) - finished)
     h.claim(spans <= unit.SPANS_INSIDE)
     h.claim(spans.any() == owed.any())
+    return h
+
+
+def of_beats(lanes):
+    """Spans of 1 to 15 pixels in beats of several lanes. Coordinates have 2 bits."""
+    unit = PixelAssemblerUnit(2, 1, 4, lanes)
+    h = Harness(unit)
+    length, bits = unit.coordinates.payload.length, lanes.bit_length() - 1
+    h.assume(length != 0)
+
+    def image(span, place, last, beat):
+        first = Cat(Const(0, bits), place)
+        present = Cat(first + lane < span.length for lane in range(lanes))
+        absent = Cat(~beat.present[lane] & Value.cast(beat.colors[lane]).any() for lane in range(lanes))
+        at = (beat.x == (span.x + first)[:2]) & (beat.y == span.y) & (beat.last == last)
+        return at & (beat.present == present) & ~absent.any()
+
+    stays(h, unit.o)
+    beats = (length + lanes - 1)[bits:]
+    pixels_follow(h, unit.coordinates, unit.o, beats, 4 * (16 // lanes) + 2, image)
     return h
 
 
@@ -71,6 +91,12 @@ def test_waiting_spans(prove):
     At most `PixelAssemblerUnit.SPANS_INSIDE` spans are inside.
     """
     prove(of_waiting_spans())
+
+
+@pytest.mark.parametrize("lanes", [2, 4])
+def test_beats(prove, lanes):
+    """By induction: beats of several lanes have their places, and a bit for each lane with a pixel."""
+    prove(of_beats(lanes))
 
 
 def test_progress(prove):

@@ -16,7 +16,7 @@ COARSE = CoarseDepth(64, 48)
     ("options", "message"),
     [
         ({"style": "fast"}, "style must be one of throughput, compact, not 'fast'"),
-        ({"lanes": 3}, "lanes must be one of 1, 2, not 3"),
+        ({"lanes": 3}, "lanes must be one of 1, 2, 4, not 3"),
         ({"pipes": 3}, "pipes must be one of 1, 2, 4, 8, not 3"),
         ({"top": "gpu"}, "top must be one of shader, geometry, render, not 'gpu'"),
         ({"setups": 0}, "setups must be one of 1, 2, 4, not 0"),
@@ -39,6 +39,7 @@ def test_unknown_values(options, message):
         ("lanes", {"lanes": 2, "pipes": 2}),
         ("lanes", {"lanes": 2, "bus": "axi"}),
         ("lanes", {"lanes": 2, "top": "geometry"}),
+        ("lanes", {"lanes": 4, "top": "render"}),
         ("lanes", {"lanes": 2, "style": "compact"}),
         ("merged", {"merged": True}),
         ("setups", {"setups": 2}),

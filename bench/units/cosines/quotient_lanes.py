@@ -57,6 +57,13 @@ def _spans(unit, rng, count):
     return vector_case(unit, vectors, length, line_directions(rng, unit.model.lights))
 
 
+def _lengths(unit, rng, count):
+    """Spans of every length from 1 to 70 pixels."""
+    length = rng.permutation(np.arange(1, min(71, 1 << unit.length_bits)))
+    vectors = vectors_with_pairs(rng, unit.model, length)
+    return vector_case(unit, vectors, length, line_directions(rng, unit.model.lights))
+
+
 def _long_spans(unit, rng, count):
     """Spans of 3000 to 4095 pixels, where the last bits of differences change the words."""
     length = np.maximum(rng.integers(3000, 4096, 8) % (1 << unit.length_bits), 1)
@@ -66,18 +73,22 @@ def _long_spans(unit, rng, count):
 
 def _any_steps(unit, rng, count):
     """Steps of any size, not shifted. Sums wrap."""
-    length = rng.integers(3, 8, count)
+    length = rng.integers(3, 4 * unit.model.lanes, count)
     start, step = rng.integers(1 - (1 << 17), 1 << 17, (2, count, len(unit.model.components)))
     vectors = SpanVectors(start, step, np.zeros(count, dtype=np.int64))
     return vector_case(unit, vectors, length, line_directions(rng, unit.model.lights))
 
 
+_BOTH = "N.H", "N.H, 4 lanes"
+"""Variants that get every stimulus."""
+
 RECORD = Record(
     name="quotient_lanes",
-    title="Squares and linear functions of N/W along spans, two pixels a cycle",
+    title="Squares and linear functions of N/W along spans, several pixels a cycle",
     source="docs/theory/quotient.md#lanes",
     variants={
         "N.H": Variant(partial(QuotientLanesUnit, QuotientLanes())),
+        "N.H, 4 lanes": Variant(partial(QuotientLanesUnit, QuotientLanes(lanes=4)), long=True),
         "R.V": Variant(partial(QuotientLanesUnit, QuotientLanes(mirror=True)), long=True),
         "2 lights": Variant(partial(QuotientLanesUnit, QuotientLanes(2), 9), long=True),
         "2 lights, no highlights": Variant(
@@ -93,13 +104,17 @@ RECORD = Record(
         "2 lights, no highlights, no pairs": Variant(
             partial(QuotientLanesUnit, QuotientLanes(2, highlights=False, pairs=False)), long=True
         ),
+        "R.V, 2 lights, 4 lanes": Variant(
+            partial(QuotientLanesUnit, QuotientLanes(2, mirror=True, lanes=4), 9), long=True
+        ),
     },
     expect=_expect,
     stimuli={
         "spans": Stimulus(_spans, 3000),
-        "words": Stimulus(extreme_words, 500, repeats=4),
-        "steps": Stimulus(_any_steps, 100),
-        "long spans": Stimulus(_long_spans, stalled=False),
+        "words": Stimulus(extreme_words, 500, repeats=4, variants=_BOTH),
+        "steps": Stimulus(_any_steps, 100, variants=_BOTH),
+        "lengths": Stimulus(_lengths, 70, variants=_BOTH),
+        "long spans": Stimulus(_long_spans, stalled=False, variants=_BOTH),
     },
     axis="",
     still={

@@ -86,7 +86,7 @@ def test_quotient_is_swept_with_its_lobes():
     """quotient has its own operand, and no choice of words or degrees."""
     found, impossible = Sweep(methods=("quotient", "renormalise")).candidates()
     quotients = [(one.model, one.style, one.lanes) for one in found if one.method == "quotient"]
-    builds = [("throughput", 1), ("throughput", 2), ("compact", 1)]
+    builds = [("throughput", 1), ("throughput", 2), ("throughput", 4), ("compact", 1)]
     assert quotients == [(model, *build) for model in ("blinn", "phong") for build in builds]
     assert {one.lanes for one in found if one.method == "renormalise"} == {1}
     assert impossible["quotient: serves only models that come from a table"] == 3 * len(builds)
@@ -126,7 +126,7 @@ def test_every_method_is_in_the_default_sweep():
     [
         (Candidate("linear"), True),
         (Candidate("quotient", "phong"), True),
-        (Candidate("quotient", "phong", lanes=2), True),
+        (Candidate("quotient", "phong", lanes=4), True),
         (Candidate("quadratic", "exp", 2, "one_minus_cosine", 3, style="compact"), True),
         (Candidate("chord-local", fraction_bits=46), True),
         (Candidate("chord-local", "cosquad7", 2, None, None, 40, "compact"), False),

@@ -43,10 +43,11 @@ def test_frames(method, share):
 
 
 @pytest.mark.long
+@pytest.mark.parametrize("lanes", [2, 4])
 @pytest.mark.parametrize("triangles", [400, 20_000])
-def test_frames_of_two_lanes(triangles):
-    """The recurrence of two lanes, for long and for short spans."""
-    simulated, modelled = compare(preset().built(lanes=2), triangles, (160, 120))
+def test_frames_of_several_lanes(triangles, lanes):
+    """The recurrence of several lanes, for long and for short spans."""
+    simulated, modelled = compare(preset().built(lanes=lanes), triangles, (160, 120))
     assert abs(modelled - simulated) <= 0.002 * simulated
 
 

@@ -143,11 +143,13 @@ def test_command(options, family, calls, cache, tmp_path, capsys):
         ([], ECP5),
         (["--pipes", "2", "--family", "ecp5"], ECP5),
         (["--pipes", "4"], ECP5_85F),
+        (["--method", "quotient", "--lanes", "2"], ECP5),
+        (["--method", "quotient", "--lanes", "4"], ECP5_85F),
         (["--family", "ecp5-85f"], ECP5_85F),
     ],
 )
 def test_device_by_the_number_of_pipelines(options, device, capsys, monkeypatch):
-    """Several pipelines take the larger device, unless another is given."""
+    """Several pipelines and four lanes take the larger device, unless another is given."""
 
     def lays_out(name, unit, seeds, jobs, progress, tell, family, absorb):
         return Layout(name, Parts(1, 2, 3, 4, 5), (Place(1, 130.0, "a", "b", 4.0, 3.0, {}),))

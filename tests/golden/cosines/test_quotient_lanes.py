@@ -1,4 +1,4 @@
-"""Beats of two lanes: the same pixels as with one lane."""
+"""Beats of several lanes: the same pixels as with one lane."""
 
 import numpy as np
 import pytest
@@ -9,9 +9,10 @@ from blysk.golden.cosines.quotient_lanes import QuotientLanes, pixels_of_beats, 
 from blysk.golden.cosines.quotient_spans import QuotientSpans
 
 
-def test_beats_have_the_pixels_of_one_lane():
-    rng, model = np.random.default_rng(1), QuotientLanes()
-    length = rng.integers(1, 9, 300)
+@pytest.mark.parametrize("lanes", [2, 4])
+def test_beats_have_the_pixels_of_one_lane(lanes):
+    rng, model = np.random.default_rng(1), QuotientLanes(lanes=lanes)
+    length = rng.permutation(np.r_[rng.integers(1, 9, 300), 1:71])
     vectors, direction = vectors_with_pairs(rng, model, length), line_directions(rng, 1)
     apart, each, span = separate_pairs(vectors, length)
     single = QuotientSpans().compute(apart, each, direction)
@@ -20,7 +21,7 @@ def test_beats_have_the_pixels_of_one_lane():
     assert np.array_equal(words.rest.codes[present], single.rest.codes)
     assert np.array_equal(words.numerator.codes[present], single.numerator.codes)
     assert not words.line.codes[~present].any()
-    assert np.array_equal(np.bincount(of_beat), -(-length // 2))
+    assert np.array_equal(np.bincount(of_beat), -(-length // lanes))
     assert np.array_equal(np.bincount(span, each), length)
 
 
@@ -51,9 +52,13 @@ def test_pixels_of_beats():
     assert index.tolist() == [[0, 1], [2, 2], [3, 4], [5, 5]]
     assert present.tolist() == [[True, True], [True, False], [True, True], [True, False]]
     assert span.tolist() == [0, 0, 2, 3]
+    index, present, span = pixels_of_beats(np.array([5, 0, 2, 4]), 4)
+    assert index.tolist() == [[0, 1, 2, 3], [4, 4, 4, 4], [5, 6, 5, 5], [7, 8, 9, 10]]
+    assert present.sum(axis=1).tolist() == [4, 1, 2, 4]
+    assert span.tolist() == [0, 0, 2, 3]
     assert len(pixels_of_beats(np.zeros(0, dtype=int), 2)[0]) == 0
 
 
 def test_number_of_lanes_is_checked():
-    with pytest.raises(ValueError, match="lanes must be 2, not 3"):
+    with pytest.raises(ValueError, match="lanes must be 2 or 4, not 3"):
         QuotientLanes(lanes=3)

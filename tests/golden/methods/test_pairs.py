@@ -21,7 +21,8 @@ def shuffled(rng, count):
     return replace(spans, x=x, y=np.cumsum(rng.random(count) < 0.1), material=material)
 
 
-def test_pairs_have_the_same_pixels():
+@pytest.mark.parametrize("lanes", [2, 4])
+def test_pairs_have_the_same_pixels(lanes):
     rng = np.random.default_rng(3)
     spans = shuffled(rng, 400)
     constants = any_constants(rng, TWO, spans)
@@ -29,9 +30,12 @@ def test_pairs_have_the_same_pixels():
     pairs = int(np.count_nonzero(sent.length == 2))
     assert pairs > 40
     assert len(spans) - len(sent) == pairs
-    one, two = TWO.built(lanes=1).compute(spans, constants), TWO.compute(sent, constants)
+    one, several = (
+        TWO.built(lanes=1).compute(spans, constants),
+        TWO.built(lanes=lanes).compute(sent, constants),
+    )
     for name in ("x", "y", "color"):
-        assert np.array_equal(getattr(one, name), getattr(two, name)), name
+        assert np.array_equal(getattr(one, name), getattr(several, name)), name
     assert TWO.built(lanes=1).interpolator.sent(spans) is spans
 
 

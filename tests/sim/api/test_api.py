@@ -218,15 +218,16 @@ def test_several_pipelines_give_the_same_picture():
 
 
 @pytest.mark.long
-def test_two_lanes_give_the_same_picture():
-    """Two lanes take fewer cycles, and the figures name their number."""
+@pytest.mark.parametrize(("lanes", "share"), [(2, 0.8), (4, 0.5)])
+def test_several_lanes_give_the_same_picture(lanes, share):
+    """Several lanes take fewer cycles, and the figures name their number."""
     options = {"size": (160, 120), "triangles": 400}
-    one, two = (blysk.render("teapot", lanes=lanes, **options) for lanes in (1, 2))
-    np.testing.assert_array_equal(two.image, one.image)
-    assert one.pixels == two.pixels
-    assert two.cycles < 0.8 * one.cycles
-    assert (one.figures["lanes"], two.figures["lanes"]) == (1, 2)
-    assert any(line.endswith(", 2 lanes") for line in two.lines())
+    one, several = (blysk.render("teapot", lanes=number, **options) for number in (1, lanes))
+    np.testing.assert_array_equal(several.image, one.image)
+    assert one.pixels == several.pixels
+    assert several.cycles < share * one.cycles
+    assert (one.figures["lanes"], several.figures["lanes"]) == (1, lanes)
+    assert any(line.endswith(f", {lanes} lanes") for line in several.lines())
 
 
 @pytest.mark.long
@@ -280,8 +281,13 @@ SCENE_OF_ITS_OWN = blysk.scene(**TINY)
         ("teapot", {"pipes": 16}, "pipes 16: out of range; give one of 1, 2, 4, 8"),
         ("teapot", {"pipes": 8, "size": (40, 7)}, "pipes 8: the picture has 7 rows; give at most one for "),
         ("teapot", {"pipes": 2, "geometry": "hardware"}, "geometry hardware: triangles go to one pipeline; "),
-        ("teapot", {"lanes": 4}, "lanes 4: out of range; give one of 1, 2"),
-        ("teapot", {"lanes": 2, "pipes": 2}, "lanes 2: several pipelines give single pixels; leave out "),
+        ("teapot", {"lanes": 3}, "lanes 3: not one of the choices; give one of 1, 2, 4"),
+        ("teapot", {"lanes": 4, "pipes": 2}, "lanes 4: several pipelines give single pixels; leave out "),
+        (
+            "teapot",
+            {"lanes": 4, "geometry": "hardware"},
+            "lanes 4: the depth test takes at most two pixels a cycle; take two lanes, or use spans",
+        ),
         ("teapot", {"lanes": 2, "method": "linear"}, "lanes 2: method linear makes single pixels; take the "),
         ("teapot", {"lanes": 2, "style": "compact"}, "lanes 2: a pixel of the compact style takes several "),
         (

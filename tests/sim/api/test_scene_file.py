@@ -360,7 +360,7 @@ VALUES = {
     "pipeline.gate": st.booleans(),
     "pipeline.specialise": st.booleans(),
     "pipeline.short_words": st.booleans(),
-    "pipeline.lanes": st.sampled_from([1, 2]),
+    "pipeline.lanes": st.sampled_from([1, 2, 4]),
     "pipeline.pipes": st.sampled_from([1, 2, 4, 8]),
 }
 
