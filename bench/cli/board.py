@@ -76,7 +76,7 @@ _MOST_FRAMES = 60
 @click.option(
     "--vertex-colours",
     is_flag=True,
-    help="Draw vertex colours on a board with a 25F, too. So far no placement of them was found.",
+    help="Draw vertex colours on a board with a 25F, too. So far no placement of them was routed.",
 )
 @click.option("--record", type=OutputFile(), help="JSON file to which the figures of this run are added.")
 @click.option("--load", is_flag=True, help="Load the bitstream with openFPGALoader.")

@@ -105,7 +105,7 @@ def gpu_of(
     lines : int, optional
         Lines of a band. By default as many as fit.
     vertex_colours : bool
-        Whether a small device draws vertex colours. So far no placement of them was found there.
+        Whether a small device draws vertex colours. So far no placement of them was routed there.
 
     Raises
     ------
@@ -204,7 +204,7 @@ def _fitted(
     if scene.textures and board.compact:
         raise _NoRoom(f"the {board.name} has too few multipliers for textures; use ulx3s-85f")
     if board.compact and not vertex_colours:
-        raise _NoRoom(f"no placement of them was found on the {board.name} so far; try --vertex-colours")
+        raise _NoRoom(f"no placement of them was routed on the {board.name} so far; try --vertex-colours")
     # Bands of fewer lines take more cycles, because every band reads all triangles.
     least = board.lines // 2 if board.compact else board.lines
     choices = [lines] if lines else sorted({board.lines, least}, reverse=True)

@@ -170,7 +170,7 @@ def test_colours_are_drawn_if_there_is_room(name, tmp_path):
         assert gpu_of(board, colours, {})[0].drawing.mesh.surface == AttributeSpans()
         return
     told = (
-        rf"a is drawn without: vertex colours \(no placement of them was found on the {name} so far; try --v"
+        rf"a is drawn without: vertex colours \(no placement of them was routed on the {name} so far; try --"
     )
     with pytest.warns(RuntimeWarning, match=told):
         assert gpu_of(board, colours, {})[0].drawing.mesh.surface is None
