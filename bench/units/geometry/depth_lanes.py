@@ -78,6 +78,7 @@ RECORD = Record(
     variants={
         "": Variant(partial(DepthLanesUnit, 4, 3, (16, 8)), note="exact"),
         "odd width": Variant(partial(DepthLanesUnit, 4, 3, (13, 5)), long=True),
+        "4 lanes": Variant(partial(DepthLanesUnit, 4, 3, (15, 8), lanes=4), long=True),
     },
     expect=lambda unit, case: _drawn(unit, case.beats)[0],
     status=_status,
