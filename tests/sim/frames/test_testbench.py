@@ -229,6 +229,7 @@ def test_passes_for_every_core(run, tmp_path, decided, top, bus, simulator):
         ("--bus", "axi", "--albedo", "colors"),
         ("--bus", "wishbone", "--materials", "3", "--albedo", "bilinear", "--method", "quotient"),
         ("--top", "render", "--coarse", "32x24", "--bus", "axi", "--stream", "128"),
+        ("--top", "render", "--lanes", "2", "--method", "quotient", "--style", "throughput"),
     ],
     ids=" ".join,
 )
