@@ -65,9 +65,10 @@ def _plan(unit: Any, tables: dict[str, Table]) -> dict[str, Any]:
 
 def _memories(core: Any) -> list[str]:
     """Beginnings of the ports of each memory of depths."""
-    member = core.signature.members.get("memory", None)
-    if member is None:
+    members = dict(core.signature.members)
+    if "memory" not in members:
         return []
+    member = members["memory"]
     return [f"memory_{bank}" for bank in range(*member.dimensions)] if member.dimensions else ["memory"]
 
 
