@@ -19,6 +19,7 @@ from .verilog_bench import VerilogBench, assert_beats, missing_tool, pauses, wit
 CASES = {
     ("pipeline", "linear, cosquad"): 40,
     ("pipeline", "quotient, blinn"): 200,
+    ("pipeline", "4 lanes"): 200,
     ("geometry", "two lanes"): 60,
     ("geometry", "compact"): 60,
     ("render", "quotient"): 60,
