@@ -2,6 +2,7 @@
 
 import ast
 import csv
+import json
 import os
 import re
 import subprocess
@@ -22,6 +23,7 @@ from blysk.golden.presets import preset
 from blysk.hdl.bus.bus import core_of
 from blysk.hdl.emit.verilog import port_widths
 from blysk.sim.cli.main import main
+from blysk.sim.frames.testbench import bench_files
 from blysk.sim.frames.vectors import teapot_frame, vectors
 
 from ...decided import digest_of
@@ -139,6 +141,22 @@ def test_columns_of_two_lanes():
     ports = port_widths(core_of(design))
     assert {f"memory_{bank}_read_data" for bank in range(2)} < ports.keys()
     assert abs(ports["memory_1_write_place_x"]) == 11
+
+
+@pytest.mark.parametrize(
+    ("options", "memories"),
+    [
+        ({}, []),
+        ({"top": "geometry"}, []),
+        ({"top": "render"}, ["memory"]),
+        ({"top": "render", "lanes": 2}, ["memory_0", "memory_1"]),
+    ],
+    ids=str,
+)
+def test_plan_names_the_memories_of_depths(options, memories):
+    design = preset().built(**options)
+    files = bench_files(design, core_of(design), "blysk", "", [])
+    assert json.loads(files["vectors/plan.json"])["memories"] == memories
 
 
 def test_frame_shows_every_light_and_material():
