@@ -10,7 +10,7 @@ import click
 from click.core import ParameterSource
 
 from blysk.bench.tools.board_options import COLOURS, DEFAULT_COLOURS, DEFAULTS, LOADERS, OPTIONS
-from blysk.bench.tools.boards import board_named, packages_missing
+from blysk.bench.tools.boards import BOARDS, board_named, packages_missing
 from blysk.sim.api.options import DESIGN, SCENE
 from blysk.sim.api.settings import check_mesh, read_settings
 from blysk.sim.cli.options import given_options, options_of
@@ -47,8 +47,7 @@ _MOST_FRAMES = 60
 @click.option(
     "--clock",
     type=Number(1, 126, "MHz"),
-    default=52.5,
-    show_default=True,
+    show_default=", ".join(f"{board.name} {board.clock:g}" for board in BOARDS.values()),
     help="Wanted drawing clock in MHz. The highest possible rate up to this value is used.",
 )
 @click.option(

@@ -41,7 +41,10 @@ __all__ = ["command"]
 )
 @click.option("--vertex-colours", is_flag=True, help="As the bitstream was made.")
 @click.option(
-    "--clock", type=Number(1, 126, "MHz"), default=52.5, show_default=True, help="As the bitstream was made."
+    "--clock",
+    type=Number(1, 126, "MHz"),
+    show_default=", ".join(f"{board.name} {board.clock:g}" for board in BOARDS.values()),
+    help="As the bitstream was made.",
 )
 @options_of(OPTIONS)
 @click.pass_context

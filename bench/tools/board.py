@@ -68,7 +68,7 @@ def planned(
     mesh: str,
     given: Mapping[str, Any],
     colours: str,
-    clock: float,
+    clock: float | None = None,
     source: RoutedBitstream | None = None,
     loader: str | None = None,
     made_for: str | None = None,
@@ -80,8 +80,8 @@ def planned(
     ----------
     board, mesh, given, colours, vertex_colours
         As in `gpu_of`.
-    clock : float
-        Rate of the drawing clock, MHz.
+    clock : float, optional
+        Rate of the drawing clock, MHz. By default that of the board.
     source : RoutedBitstream, optional
         Bitstream of the same design, whose memories the drawing must fit. By default memories have room for
         as many words as their block RAMs hold.
@@ -96,7 +96,7 @@ def planned(
         As in `gpu_of` and `loader_of`. If no PLL gives the clocks, or a frame takes longer than the display
         leaves. If the drawing does not fit the memories, or the bitstream is of another design.
     """
-    lines, first = None, None
+    lines, first, clock = None, None, clock or board.clock
     if source is not None:
         lines = min(source.lines, board.lines)
     if made_for is not None:
