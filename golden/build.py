@@ -176,7 +176,7 @@ class Build:
             (self.top == "geometry", "geometry gives spans, and no pixels", "leave out lanes"),
             (
                 self.takes_triangles and self.lanes > 2,
-                "the depth test takes at most two pixels a cycle",
+                "the renderer serves at most two lanes",
                 "take two lanes, or use spans",
             ),
             (self.pipes > 1, "several pipelines give single pixels", "leave out lanes or pipes"),

@@ -286,7 +286,7 @@ SCENE_OF_ITS_OWN = blysk.scene(**TINY)
         (
             "teapot",
             {"lanes": 4, "geometry": "hardware"},
-            "lanes 4: the depth test takes at most two pixels a cycle; take two lanes, or use spans",
+            "lanes 4: the renderer serves at most two lanes; take two lanes, or use spans",
         ),
         ("teapot", {"lanes": 2, "method": "linear"}, "lanes 2: method linear makes single pixels; take the "),
         ("teapot", {"lanes": 2, "style": "compact"}, "lanes 2: a pixel of the compact style takes several "),
