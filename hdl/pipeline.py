@@ -114,8 +114,9 @@ class ShadingPipelineUnit(wiring.Component):
 
     With two or four lanes a beat of ``o`` has as many neighbouring pixels of a span, see `beat_shape`. The
     interpolator makes the operands of all pixels, and each lane has units of its own from there to the
-    colours. In the rules above beats take the place of pixels. A span of two pixels is a pair, see
-    `QuotientLanesUnit`. With four lanes a beat of three or four pixels takes two cycles if it is a span.
+    colours. In the rules above beats take the place of pixels. A span of two pixels from software is a pair,
+    see `QuotientLanesUnit`. With four lanes a span of three or four pixels is a single beat, and takes two
+    cycles.
 
     Without lights there is neither interpolator nor multiplier. Every pixel has the ambient colour.
 

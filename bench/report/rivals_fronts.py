@@ -137,18 +137,19 @@ def _placed_points(of_mesh: Mapping[str, Frames]) -> dict[str, dict[str, dict[st
 
 def _fronts_placed(points: Mapping[str, Mapping[str, Any]]) -> tuple[list[str], list[str]]:
     """Fronts of tables times time against error, and of both and multipliers times time."""
-    same = {name: of for name, of in points.items() if _is_blinn(name)}
-    two, three = ("tables", "error"), ("tables", "multipliers", "error")
-    both = (front_of({name: [of[k] for k in keys] for name, of in same.items()}) for keys in (two, three))
-    return next(both), next(both)
+
+    def front(*keys: str) -> list[str]:
+        return front_of({name: [of[k] for k in keys] for name, of in points.items() if _is_blinn(name)})
+
+    return front("tables", "error"), front("tables", "multipliers", "error")
 
 
 def placed_table(of_mesh: Mapping[str, Frames]) -> Table:
     """Parts, clock rate and time of every placed method on every mesh, and whether it is on a front."""
     columns = ["method", "mesh", "look-up tables", "flip-flops", "multipliers", "block RAMs", "seeds"]
     columns += ["clock rate, median, MHz", "cycles a pixel", "ns a pixel", "tables times ns"]
-    columns += ["multipliers times ns", "error, LSB", "on the front of tables", "on the front of tables and"]
-    columns[-1] += " multipliers"
+    columns += ["multipliers times ns", "error, LSB", "on the front of tables"]
+    columns += ["on the front of tables and multipliers"]
     rows: list[list[Cell]] = []
     for mesh, points in _placed_points(of_mesh).items():
         fronts = _fronts_placed(points)
