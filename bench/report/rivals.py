@@ -25,7 +25,7 @@ from blysk.bench.report.rivals_fronts import (
 )
 from blysk.bench.report.section import Cell, Section, Table
 from blysk.bench.ring import ring
-from blysk.bench.speed.cycle_model import frame_cycles, unit_of
+from blysk.bench.speed.cycle_model import steady_cycles, unit_of
 from blysk.bench.store import Task
 from blysk.golden.frames.border import border_mask
 from blysk.golden.reference.lighting import Light
@@ -46,6 +46,7 @@ __all__ = [
     "errors",
     "host_work",
     "parts",
+    "rastered",
     "section",
     "tasks",
 ]
@@ -68,7 +69,8 @@ SHARED_LSB = 0.25
 
 
 @lru_cache(maxsize=2)
-def _rastered(mesh: str, size: tuple[int, int]) -> tuple[Scene, Raster]:
+def rastered(mesh: str, size: tuple[int, int]) -> tuple[Scene, Raster]:
+    """The scene of a mesh, named as in `FULL`, and its raster."""
     kind, _, count = mesh.partition("-")
     made = teapot(int(count)) if kind == "teapot" else ring(int(count), int(count) // 2)
     scene = scene_for(made, 1, *size)
@@ -114,7 +116,7 @@ def errors(
         - ``cycles``: cycles a pixel, and ``switched``: switched bits a pixel, at the exponent `DRAWN`.
     """
     rival = COMPARED[name]
-    scene, raster = _rastered(mesh, tuple(size))
+    scene, raster = rastered(mesh, tuple(size))
     scene = _lit(scene, lights)
     found = []
     for exponent in exponents:
@@ -145,12 +147,15 @@ def errors(
 
 
 def _cycles(rival: Rival, scene: Scene, raster: Raster) -> float:
-    """Cycles a pixel: by the cycle model of a design, else as docs/theory/rivals.md#counting says."""
+    """Cycles a pixel: of a design by the cycle model, else as docs/theory/rivals.md#counting says.
+
+    The filling of a pipeline does not count.
+    """
     pixels = len(raster.span)
     if isinstance(rival, SpanDesign):
         _, spans, _ = rival.prepared(scene, raster)
         unit = unit_of(rival.design(len(scene.lights)))
-        return (frame_cycles(unit, spans, 0) - unit.latency) / pixels
+        return steady_cycles(unit, spans) / pixels
     return max(pixels, rival.SETUP_CYCLES * len(np.unique(raster.triangle))) / pixels
 
 
@@ -208,7 +213,7 @@ def parts(name: str, lights: int, mesh: str, size: Sequence[int], netlist: bool)
         - ``host``: see `host_work`.
     """
     rival = COMPARED[name]
-    scene, raster = _rastered(mesh, tuple(size))
+    scene, raster = rastered(mesh, tuple(size))
     scene = _lit(scene, lights)
     trace = Trace(switches=False)
     rival.shade(scene, raster, trace)

@@ -13,7 +13,7 @@ from blysk.hdl.pipeline import ShadingPipelineUnit
 from blysk.sim.frames.frame import FrameSimulator
 from blysk.sim.meshes.teapot import teapot
 
-__all__ = ["WAITING", "beat_cycles", "compare", "frame_cycles", "span_cycles", "unit_of"]
+__all__ = ["WAITING", "beat_cycles", "compare", "frame_cycles", "span_cycles", "steady_cycles", "unit_of"]
 
 _NEVER = -(1 << 40)
 """This number stands for minus infinity in sums of cycles."""
@@ -145,13 +145,29 @@ def frame_cycles(unit: ShadingPipelineUnit, spans: Spans, writes: int) -> int:
     writes : int
         Number of writes of constants before the frame.
     """
+    return 1 + writes + unit.latency + _cycles(unit, spans, 1)
+
+
+def steady_cycles(unit: ShadingPipelineUnit, spans: Spans) -> int:
+    """Cycles of a frame behind an equal frame, so without the filling of the pipeline.
+
+    Parameters
+    ----------
+    unit, spans
+        As in `frame_cycles`.
+    """
+    return _cycles(unit, spans, 2) - _cycles(unit, spans, 1)
+
+
+def _cycles(unit: ShadingPipelineUnit, spans: Spans, frames: int) -> int:
+    """Cycles from the first pixel of equal frames to the last pixel."""
     method, lanes = unit._interpolator, unit.model.build.lanes
     if lanes > 1:
-        length = np.asarray(unit.model.interpolator.sent(spans).length, dtype=np.int64)
-        return 1 + writes + unit.latency + beat_cycles(length, lanes)
+        sent = np.asarray(unit.model.interpolator.sent(spans).length, dtype=np.int64)
+        return beat_cycles(np.tile(sent, frames), lanes)
     length = np.asarray(spans.length, dtype=np.int64) * unit.cycles_per_pixel
-    cycles = span_cycles(length, method.span_intervals(spans), method.room_after)
-    return 1 + writes + unit.latency + cycles
+    interval = method.span_intervals(spans)
+    return span_cycles(np.tile(length, frames), np.tile(interval, frames), method.room_after)
 
 
 def unit_of(design: ShadingPipeline) -> ShadingPipelineUnit:

@@ -4,9 +4,18 @@ import numpy as np
 import pytest
 
 from blysk.bench.accuracy import model_of
-from blysk.bench.speed.cycle_model import WAITING, beat_cycles, compare, span_cycles
+from blysk.bench.speed.cycle_model import (
+    WAITING,
+    beat_cycles,
+    compare,
+    frame_cycles,
+    span_cycles,
+    steady_cycles,
+    unit_of,
+)
 from blysk.bench.units.cosines.quotient_lanes import vectors_with_pairs
 from blysk.bench.units.cosines.quotient_spans import line_directions, vector_case
+from blysk.golden.beats import Spans
 from blysk.golden.cosines.quotient_lanes import QuotientLanes
 from blysk.golden.presets import preset
 from blysk.hdl.cosines.quotient_lanes import QuotientLanesUnit
@@ -30,6 +39,22 @@ def test_recurrence(count, waiting):
     rng = np.random.default_rng(count)
     length, interval = rng.integers(1, 12, count), rng.integers(1, 7, count)
     assert span_cycles(length, interval, waiting) == looped(length.tolist(), interval.tolist(), waiting)
+
+
+def test_a_pixel_in_each_cycle_whatever_the_length():
+    """`quotient` loses cycles only before a frame's second span. `renormalise` waits for short spans."""
+    rng = np.random.default_rng(50)
+    units = [unit_of(preset(method, "blinn")) for method in ("quotient", "renormalise")]
+    for longest in (1, 2, 3, 4, 40):
+        for _ in range(20):
+            length = rng.integers(1, longest + 1, rng.integers(2, 200))
+            place, ends = np.zeros_like(length), np.zeros((len(length), 3), dtype=np.int64)
+            spans = Spans(place, place, length, ends, ends)
+            own, other = (steady_cycles(unit, spans) for unit in units)
+            assert own == length.sum()
+            assert other > own or longest > 2
+            filling = frame_cycles(units[0], spans, 0) - units[0].latency - 1 - own
+            assert 0 <= filling <= 2
 
 
 @pytest.mark.long
