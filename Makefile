@@ -63,9 +63,10 @@ decided: $(VENV)/.installed-test
 		tests/simulators tests/hdl/test_toggle_coverage.py tests/sim/frames/test_testbench.py
 	LC_ALL=C sort -u build/decided > tests/decided.txt
 
-# A search for the largest errors. ADVERSARY_SEED=N searches from another seed.
+# A search for the largest errors from a new seed each day, or from ADVERSARY_SEED=N. It prints its seed.
 adversary: $(VENV)/.installed-test
-	$(BIN)/python -m pytest -s -m long tests/judges/test_adversary.py
+	ADVERSARY_SEED=$${ADVERSARY_SEED:-$$(date +%Y%m%d)} \
+		$(BIN)/python -m pytest -s -m long tests/judges/test_adversary.py
 
 mutants: $(VENV)/.installed-test
 	$(BIN)/python -m blysk.bench.quality.mutants
@@ -122,12 +123,12 @@ release: $(VENV)/.installed-release
 	mv build/SHA256SUMS build/dist
 	mv build/dist dist
 
-# Measures the sections of the report that the paper takes, with pictures of full size and committed clock rates.
+# Measures the sections of the report that the paper takes, with pictures of full size. Clock rates are committed.
 # PAPER_OPTIONS=--quick takes small pictures, in minutes.
 paper: $(VENV)/.installed-bench
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check -e '.[paper]'
 	mkdir -p build/paper
-	$(BIN)/blysk bench build/paper/report --only points --only rivals --committed-rates $(PAPER_OPTIONS)
+	$(BIN)/blysk bench build/paper/report --only methods --only rivals $(PAPER_OPTIONS)
 	$(BIN)/python -m blysk.bench.quality.paper build/paper/report/report.json
 
 lint: style types

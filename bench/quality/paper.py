@@ -32,7 +32,6 @@ __all__ = [
     "exponents_of",
     "lights_of",
     "measured_of",
-    "methods_of",
     "paper",
     "rivals_of",
 ]
@@ -45,83 +44,20 @@ OF_LIGHTS = "quotient", "renormalise", "chord-local"
 """Methods in the table of multipliers."""
 SHOWN = 1, 2, 3, 10, 30, 100, 300, 1000
 """Exponents in the drawing of errors and bounds."""
-EXPONENT = 100
-"""Exponent of the table of methods."""
 
 _ENGINES = {"cxxrtl": "the simulated RTL", "model": "the model of cycles or a simulation with another lobe"}
 """Words for the sources of cycles, by the engine of a point."""
 
 
-def methods_of(points: Sequence[Mapping[str, Any]]) -> list[dict[str, Any]]:
-    """Rows of the table of methods: those of the report at exponent `EXPONENT` on the teapot.
-
-    A method has a row with the highlight of the documents (``cosquad``) and its own operand, and a row in its
-    best form: with an exact table, and the operand 1 - N·H if it finds normals. Published variants, other
-    highlights, and ``cosquad`` with 1 - N·H in place of the method's N·H are left out.
-
-    Parameters
-    ----------
-    points : sequence of dict
-        Points of the report's first section.
-
-    Returns
-    -------
-    list of dict
-        ``method``, ``model``, ``operand``, ``engine``; ``error`` in LSB against exact normals with the same
-        lobe, ``cycles`` a pixel, ``multipliers``; ``luts``, ``flip_flops``, ``mhz`` (the median), ``seeds``
-        and ``date``, ``None`` without a placement. The smallest error is first.
-
-    Raises
-    ------
-    ValueError
-        If a method was not measured.
-    """
-    # These imports take a second, and bad arguments are told without them.
-    from blysk.bench.report.front import design_of
-    from blysk.bench.report.placed import placed
-    from blysk.bench.tools.families import DEVICE
-    from blysk.golden.presets import METHODS
-
-    store = placed(DEVICE)
-    rows = []
-    for point in points:
-        settings = point["settings"]
-        if settings["exponent"] != EXPONENT or settings["source"] != "teapot" or "lanes" in settings:
-            continue
-        method, model = settings["method"], settings.get("model")
-        documented = model == "cosquad" and "operand" not in settings
-        if method not in METHODS or not (documented or model in ("blinn", "phong")):
-            continue
-        parts = store.get(design_of(settings), {})
-        rows.append(
-            {
-                "method": method,
-                "model": model,
-                "operand": settings.get("operand", METHODS[method].operand),
-                "engine": settings["engine"],
-                "error": point["errors"]["method_max_lsb"],
-                "cycles": point["times"]["cycles_per_pixel"],
-                "multipliers": point["hardware"]["multipliers"],
-                "luts": parts.get("luts"),
-                "flip_flops": parts.get("flip_flops"),
-                "mhz": round(parts["fmax_median_mhz"]) if parts else None,
-                "seeds": len(parts["fmax_mhz"]) if parts else None,
-                "date": parts.get("date"),
-            }
-        )
-    lacking = {(method, "blinn") for method in METHODS} - {(row["method"], row["model"]) for row in rows}
-    if lacking:
-        raise ValueError(f"has no {min(lacking)[0]} with blinn at exponent {EXPONENT}")
-    return sorted(rows, key=lambda row: (row["error"], row["cycles"]))
-
-
-def rivals_of(tables: Mapping[str, Mapping[str, Any]]) -> dict[str, Any]:
-    """Rows of the table of rivals: those of the report's section `rivals`, errors at exponent `EXPONENT`.
+def rivals_of(tables: Mapping[str, Mapping[str, Any]], exponent: int) -> dict[str, Any]:
+    """Rows of the table of rivals: those of the report's section `rivals`.
 
     Parameters
     ----------
     tables : dict
         Tables of the section.
+    exponent : int
+        Exponent of the errors.
 
     Returns
     -------
@@ -145,7 +81,7 @@ def rivals_of(tables: Mapping[str, Mapping[str, Any]]) -> dict[str, Any]:
     hosts = {row["method"]: row for row in tables["rivals-host"]["rows"] if row["lights"] == 1}
     of_mesh: dict[str, dict[str, Mapping[str, Any]]] = {}
     for row in errors:
-        if row["exponent"] == EXPONENT:
+        if row["exponent"] == exponent:
             of_mesh.setdefault(row["method"], {})[row["mesh"]] = row
     meshes = list(next(iter(of_mesh.values())))
     rows = []
@@ -198,7 +134,7 @@ def beside(rows: Sequence[Mapping[str, Any]], own: Mapping[str, Any]) -> dict[st
     Parameters
     ----------
     rows : sequence of dict
-        Rows of `methods_of`.
+        Rows of `blysk.bench.report.methods.rows_of`.
     own : dict
         The design's row.
 
@@ -235,27 +171,25 @@ def measured_of(report: Mapping[str, Any]) -> dict[str, Any]:
     Raises
     ------
     ValueError
-        If this is no report, or the report lacks a section or a method.
+        If this is no report, or the report lacks a section.
     """
     try:
-        points = report["sections"]["points"]["figures"]["points"]
-        methods = methods_of(points)
-        settings = next(p["settings"] for p in points if p["settings"]["source"] == "teapot")
-        versions = report["versions"]
+        figures, versions = report["sections"]["methods"]["figures"], report["versions"]
+        methods = figures["rows"]
+        named = {(row["method"], row["model"]): row for row in methods}
         return {
             "version": versions["blysk"],
             "made": report["made"][:10],
             "tools": ", ".join(f"{name} {versions[name]}" for name in ("Python", "amaranth", "numpy")),
             "methods": methods,
+            "design": named["quotient", "blinn"],
+            "renormalise": named["renormalise", "blinn"],
+            "mirror": named["quotient", "phong"],
             "cycles_of": " and ".join(dict.fromkeys(_ENGINES[row["engine"]] for row in methods)),
-            "scene": {
-                "triangles": settings["triangles"],
-                "size": f"{settings['width']}x{settings['height']}",
-                "exponent": EXPONENT,
-            },
-            "rivals": rivals_of(report["sections"]["rivals"]["tables"]),
+            "scene": figures["scene"],
+            "rivals": rivals_of(report["sections"]["rivals"]["tables"], figures["scene"]["exponent"]),
         }
-    except (KeyError, TypeError, StopIteration):
+    except (KeyError, TypeError):
         raise ValueError("is not such a report") from None
 
 
@@ -310,8 +244,6 @@ def data_of(measured: Mapping[str, Any]) -> dict[str, Any]:
     from blysk.sim.meshes.teapot import teapot
 
     methods = measured["methods"]
-    named = {(row["method"], row["model"]): row for row in methods}
-    own, other = named["quotient", "blinn"], named["renormalise", "blinn"]
     guide, theory = (
         {name: (PROJECT / "docs" / folder / f"{name}.md").read_text(encoding="utf-8") for name in names}
         for folder, names in (
@@ -324,10 +256,7 @@ def data_of(measured: Mapping[str, Any]) -> dict[str, Any]:
         "title": "Phong and Blinn shading without unit normals: an open datapath with bounded errors",
         "author": re.search(r"- name: (.*)", (PROJECT / "CITATION.cff").read_text(encoding="utf-8"))[1],
         "scene": measured["scene"] | {"triangles": len(teapot(measured["scene"]["triangles"]).faces)},
-        "design": own,
-        "renormalise": other,
-        "mirror": named["quotient", "phong"],
-        "beside": beside(methods, own),
+        "beside": beside(methods, measured["design"]),
         "dates": sorted({row["date"] for row in methods if row["date"]}),
         "all_spans": documents_table(theory["quotient"], "| spans of up to |"),
         "found_spans": documents_table(theory["quotient"], "| | n = 1 | n = 10 |"),
@@ -391,7 +320,7 @@ def paper(data: Mapping[str, Any], folder: Path) -> bytes:
     show_default=True,
 )
 def _command(report: str, output: Path) -> None:
-    """Make the paper from the report.json of a report that has the sections points and rivals."""
+    """Make the paper from the report.json of a report that has the sections methods and rivals."""
     measured = _read(report)
     check_writable(output)
     scene = measured["scene"]
@@ -405,7 +334,7 @@ def _command(report: str, output: Path) -> None:
 
 def _read(report: str) -> dict[str, Any]:
     """Figures of a file, see `measured_of`."""
-    remedy = "give the report.json of `blysk bench --only points --only rivals`"
+    remedy = "give the report.json of `blysk bench --only methods --only rivals`"
     try:
         content = json.loads(Path(report).read_text(encoding="utf-8"))
     except (OSError, ValueError):

@@ -41,6 +41,7 @@ __all__ = [
     "GROUPS",
     "LANES",
     "QUICK_SIMULATED",
+    "points_of",
     "section",
     "tasks",
 ]
@@ -78,7 +79,7 @@ _BEST_OPERAND = {"operand": "one_minus_cosine"}
 _BEST_MODEL = "blinn"
 """A model with an exact table. Each method in its best form also has points with this model."""
 
-LANES = [{"method": "quotient", "model": "blinn", "lanes": 2}]
+LANES = [{"method": "quotient", "model": "blinn", "lanes": lanes} for lanes in (2, 4)]
 """Pipelines with several lanes, which have the errors of the same pipeline with one lane."""
 
 QUICK_SIMULATED = [(method, model_of(method)) for method in (*METHODS, *PUBLISHED)]
@@ -178,8 +179,11 @@ def _command(settings: Mapping[str, Any]) -> str:
     return shlex.join([*words, "--json", "figures.json"])
 
 
-def _points(tasks: Sequence[Task], results: Sequence[Any]) -> list[dict[str, Any]]:
-    """The points, sorted by mesh in the order of the tasks, then by exponent, then by design."""
+def points_of(tasks: Sequence[Task], results: Sequence[Any]) -> list[dict[str, Any]]:
+    """The points, sorted by mesh in the order of the tasks, then by exponent, then by design.
+
+    Without tasks of `speeds` and `software_speeds` they lack the run times of software.
+    """
     of_design = _of_designs(tasks, results)
     of_frame: dict[tuple, dict] = {}
     for task, result in zip(tasks, results, strict=True):
@@ -214,7 +218,7 @@ def _points(tasks: Sequence[Task], results: Sequence[Any]) -> list[dict[str, Any
                         "ns_per_pixel": None if None in (cycles, fmax) else cycles * 1e3 / fmax,
                         "multipliers": taken.get("multipliers"),
                         "luts": taken.get("luts"),
-                        **of_frame[key],
+                        **of_frame.get(key, {}),
                     },
                     "hardware": {name: taken.get(name) for name in _HARDWARE},
                     "counts": {
@@ -337,7 +341,7 @@ def section(tasks: Sequence[Task], results: Sequence[Any]) -> Section:
     tasks, results
         Tasks of `tasks` and their results, in any order.
     """
-    points = _points(tasks, results)
+    points = points_of(tasks, results)
     fronts = fronts_of(points)
     spread = {
         front.design_of(task.settings): result

@@ -7,6 +7,7 @@ __all__ = ["SECTIONS", "load"]
 
 SECTIONS: dict[str, str] = {
     "points": "blysk.bench.report.points",
+    "methods": "blysk.bench.report.methods",
     "stability": "blysk.bench.report.stability",
     "needs": "blysk.bench.report.needs",
     "criteria": "blysk.bench.report.criteria",

@@ -14,42 +14,33 @@ from blysk.bench.quality.paper import (
     data_of,
     main,
     measured_of,
-    methods_of,
     paper,
     rivals_of,
 )
 from blysk.bench.quality.paper_pages import cited
 from blysk.golden.presets import METHODS
-from blysk.sim.api.placed import read_store
 
 FORMS = [("quotient", "blinn"), ("quotient", "phong"), ("renormalise", "cosquad")]
 FORMS += [(method, "blinn") for method in METHODS if method != "quotient"]
-"""Method and model of the made-up points."""
+"""Method and model of the made-up rows."""
 
 
-def point(method, model, error, cycles, exponent=100, **further):
-    """A point of a report with made-up figures."""
-    settings = {"source": "teapot", "triangles": 1000, "width": 320, "height": 240, "exponent": exponent}
-    return {
-        "group": "software" if method == "phong" else "own",
-        "settings": settings | {"method": method, "model": model, "engine": "cxxrtl"} | further,
-        "errors": {"method_max_lsb": error},
-        "times": {"cycles_per_pixel": cycles},
-        "hardware": {"multipliers": 16 if method == "quotient" else 24},
+def row(k, method, model):
+    """A row of the section `methods`, with made-up figures."""
+    found = {"method": method, "model": model, "operand": METHODS[method].operand, "engine": "cxxrtl"}
+    found |= {
+        "error": 0.52 + k / 100,
+        "cycles": 1 + k / 100,
+        "multipliers": 16 if method == "quotient" else 24,
     }
+    luts = 4000 if method == "renormalise" else 3000 + k
+    return found | {"luts": luts, "flip_flops": 2000, "mhz": 150, "seeds": 3, "date": "2026-11-27"}
 
 
 def report():
     """A report with made-up figures of all methods and two rivals."""
-    points = [point(*form, 0.52 + k / 100, 1 + k / 100) for k, form in enumerate(FORMS)]
-    points += [
-        point("linear", "cosquad", 90.0, 1.3, operand="one_minus_cosine"),
-        point("linear", "blinn_product", 91.0, 1.3),
-        point("quadratic-published", "cosquad", 1.0, 1.3),
-        point("quotient", "blinn", 0.6, 1.0, exponent=10),
-        point("quotient", "blinn", 0.52, 0.6, lanes=2),
-        point("phong", "blinn", 0.5, None),
-    ]
+    rows = [row(k, *form) for k, form in enumerate(FORMS)]
+    scene = {"triangles": 1000, "size": "320x240", "exponent": 100}
     versions = {"blysk": "0.1.0", "Python": "3.11", "amaranth": "0.5", "numpy": "2"}
     meshes = "teapot, 992 triangles", "torus, 14,400 triangles"
     names = {"quotient": 16, "duff": 18, "bishop-weimer-six": 7, "renormalise, 3": 24}
@@ -90,7 +81,7 @@ def report():
     ]
     tables = {"parts": parts, "errors": errors, "host": hosts, "placed": placed}
     tables = {f"rivals-{name}": {"rows": rows} for name, rows in tables.items()}
-    figures = {"points": {"figures": {"points": points}}, "rivals": {"tables": tables}}
+    figures = {"methods": {"figures": {"rows": rows, "scene": scene}}, "rivals": {"tables": tables}}
     return {"made": "2026-11-27T10:00:00+00:00", "versions": versions, "sections": figures}
 
 
@@ -111,38 +102,6 @@ def measured():
     return measured_of(report()) | {"exponents": exponents, "lights": {"counts": counts, "rows": rows}}
 
 
-def test_table_of_methods():
-    """The smallest error is first. Parts are those of a placed design with the same operand and interval."""
-    rows = methods_of(report()["sections"]["points"]["figures"]["points"])
-    assert [(row["method"], row["model"]) for row in rows] == FORMS
-    assert [row["error"] for row in rows] == sorted(row["error"] for row in rows)
-    found = {(row["method"], row["model"]): row for row in rows}
-    own = found["quotient", "blinn"]
-    assert (own["operand"], own["seeds"]) == ("place", 3)
-    assert own["luts"] > 1000
-    assert own["mhz"] > 100
-    # It was placed with another setup interval than the report has.
-    other = found["renormalise", "cosquad"]
-    assert (other["operand"], other["luts"], other["mhz"], other["seeds"]) == (
-        "one_minus_cosine",
-        *[None] * 3,
-    )
-
-
-def test_a_method_has_a_documented_form_and_its_best_form():
-    points = report()["sections"]["points"]["figures"]["points"]
-    points += [
-        point("linear", "cosquad", 92.0, 1.3),
-        point("linear", "blinn", 93.0, 1.3, operand="one_minus_cosine"),
-    ]
-    documented, best = (row for row in methods_of(points) if row["error"] > 50)
-    assert (documented["model"], documented["operand"]) == ("cosquad", "cosine")
-    assert (best["model"], best["operand"]) == ("blinn", "one_minus_cosine")
-    luts = {entry["design"]: entry["luts"] for entry in read_store()}
-    assert documented["luts"] == luts["pipeline linear, cosquad, 1 light"]
-    assert best["luts"] == luts["pipeline linear, blinn, 1 light, one_minus_cosine"]
-
-
 def test_methods_beside_another():
     own = {"method": "a", "model": "x", "error": 0.514, "cycles": 1.0041, "multipliers": 16, "luts": 9}
     rows = [
@@ -161,7 +120,7 @@ def test_methods_beside_another():
 
 
 def test_table_of_rivals():
-    found = rivals_of(report()["sections"]["rivals"]["tables"])
+    found = rivals_of(report()["sections"]["rivals"]["tables"], 100)
     assert found["meshes"] == ["teapot, 992 triangles", "torus, 14,400 triangles"]
     assert found["most"] == 8
     assert found["rows"][1] == {
@@ -209,11 +168,11 @@ def test_the_paper_has_at_most_eight_pages(tmp_path):
 @pytest.mark.parametrize(
     ("content", "line"),
     [
-        (None, "is not such a report; give the report.json of `blysk bench --only points --only rivals`"),
+        (None, "is not such a report; give the report.json of `blysk bench --only methods --only rivals`"),
         ("{", "is not such a report"),
         ("[]", "is not such a report"),
         ("{}", "is not such a report"),
-        (json.dumps({"sections": {"points": {"figures": {"points": []}}}}), "has no "),
+        (json.dumps({"sections": {"methods": {"figures": {"rows": []}}}}), "is not such a report"),
         (json.dumps(report() | {"versions": {}}), "is not such a report"),
     ],
 )
