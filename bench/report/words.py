@@ -12,6 +12,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from blysk.bench.accuracy import scene_for
+from blysk.bench.report import short_words
 from blysk.bench.report.section import Cell, Drawing, Section, Table
 from blysk.bench.ring import ring
 from blysk.bench.store import Task
@@ -371,17 +372,24 @@ _SETTINGS: dict[bool, dict[str, Any]] = {
 
 
 def tasks(quick: bool) -> list[Task]:
-    """The errors against each word of each method. A quick report has small pictures and few spans."""
-    return [
+    """The errors against each word of each method, and those of short words.
+
+    A quick report has small pictures and few spans.
+    """
+    found = [
         Task(measure, {"method": method, "word": word.name} | _SETTINGS[quick])
         for method, words in METHODS.items()
         for word in words
     ]
+    return found + short_words.tasks(quick)
 
 
 def section(tasks: Sequence[Task], results: Sequence[Any]) -> Section:
-    """The section: a drawing and a table for each method."""
+    """The section: a drawing and a table for each method, and a table of exact normals in short words."""
     parts: list[Table | Drawing] = []
+    found_of = list(zip(tasks, results, strict=True))
+    short = [of for of in found_of if of[0].function is short_words.measure_short]
+    cut_words = [of for of in found_of if of[0].function is measure]
     text = [
         "Each word of a method is cut bit by bit, while all others keep their lengths. The figures are the "
         "largest errors of the diffuse term and of the highlight at full intensity, before a pixel is "
@@ -391,11 +399,9 @@ def section(tasks: Sequence[Task], results: Sequence[Any]) -> Section:
     ]
     for method, words in METHODS.items():
         found = {
-            task.settings["word"]: result
-            for task, result in zip(tasks, results, strict=True)
-            if task.settings["method"] == method
+            task.settings["word"]: result for task, result in cut_words if task.settings["method"] == method
         }
-        settings = next(task.settings for task in tasks if task.settings["method"] == method)
+        settings = next(task.settings for task, _ in cut_words if task.settings["method"] == method)
         free = {word.name: shortest(found[word.name]) for word in words}
         cut = {name: dropped for name, dropped in free.items() if dropped}
         whole = found[words[0].name][0]
@@ -408,6 +414,7 @@ def section(tasks: Sequence[Task], results: Sequence[Any]) -> Section:
             f"the errors are {_highlight(all_cut):.3f} LSB and {all_cut['diffuse']:.3f} LSB."
         )
         parts += [_drawing(method, words, found), _word_table(method, words, found, free)]
+    parts.append(short_words.table_of(*zip(*short, strict=True)))
     return Section("words", "Word lengths", text, parts)
 
 

@@ -5,6 +5,7 @@ import pytest
 
 from blysk.bench.report import words
 from blysk.bench.report.section import Drawing, Table
+from blysk.bench.report.short_words import measure_short
 from blysk.bench.report.words import METHODS, MOST_DROPPED, error_of, section, shortest, tasks
 
 SIZE, RANDOM = (40, 30), 24
@@ -42,11 +43,19 @@ def test_section_of_made_up_results():
     ]
     chosen = tasks(quick=True)
     flat = [dict(whole) for _ in growing]
-    results = [flat if task.settings["word"] == "place" else growing for task in chosen]
+    results = [
+        {"triangles": 992, "errors": [1.0, 2.0, 3.0]}
+        if task.function is measure_short
+        else flat
+        if task.settings["word"] == "place"
+        else growing
+        for task in chosen
+    ]
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(words, "error_of", lambda *_: whole)
         found = section(chosen, results)
-    assert sum(isinstance(part, Table) for part in found.parts) == len(METHODS)
+    assert sum(isinstance(part, Table) for part in found.parts) == len(METHODS) + 1
+    assert found.parts[-1].rows[0] == ["12 bits", "teapot", 992, 1.0, 2.0, 3.0]
     assert sum(isinstance(part, Drawing) for part in found.parts) == len(METHODS)
     assert f"place by {MOST_DROPPED}." in found.text[1]
     free = {row["word"]: row["bits that can go"] for row in found.parts[1].records()}
