@@ -1,33 +1,63 @@
-"""Coverage of triangles by the models, and triangles of all kinds."""
+"""Coverage of triangles by models and RTL, and triangles of all kinds."""
+
+from functools import lru_cache
 
 import numpy as np
 
+from blysk.golden.build import Build
 from blysk.golden.geometry.geometry import Geometry
-from blysk.golden.geometry.triangles import FrameSettings, Grid, Triangles
+from blysk.golden.geometry.triangles import ATTRIBUTE, FrameSettings, Grid, Triangles
 from blysk.golden.reference.camera import Camera
 from blysk.golden.reference.geometry import Mesh
 from blysk.golden.reference.lighting import Light, Material
 from blysk.golden.reference.raster import rasterise
 from blysk.golden.reference.scene import Scene
+from blysk.hdl.geometry.geometry import GeometryUnit
+from blysk.sim.engines.simulate import simulate
 
 SIDE = 16
 """Pixels of a cell. A cell holds one random triangle."""
 
 
+def as_triangles(corners, size):
+    """Triangles of the geometry with level normals, and the frame of a picture."""
+    shape, frame = corners.shape[:2], FrameSettings.centred(*size)
+    x, y = (corners[..., axis] + 256 * low for axis, low in enumerate((frame.left, frame.top)))
+    zeros, words = np.zeros(shape, dtype=np.int64), np.zeros((*shape, 3), dtype=np.int64)
+    words[..., 2] = ATTRIBUTE.max_code
+    return Triangles(x, y, zeros, words, zeros[:, 0], zeros[:, 0]), frame
+
+
+def painted(x, y, length, weights, size):
+    """Sums of the weights of the spans at each pixel, for each of some weights."""
+    found = np.zeros((len(weights), size[1], size[0] + 1), dtype=np.int64)
+    for of, weight in zip(found, weights, strict=True):
+        np.add.at(of, (y, x), weight)
+        np.add.at(of, (y, x + length), -weight)
+    return found.cumsum(axis=2)[..., :-1]
+
+
 def by_geometry(corners, tags, size):
     """Number of triangles at each pixel, and the sum of their tags, by the models of the geometry RTL."""
-    shape = corners.shape[:2]
-    frame, zeros = FrameSettings.centred(*size), np.zeros(shape, dtype=np.int64)
-    x, y = (corners[..., axis] + 256 * low for axis, low in enumerate((frame.left, frame.top)))
-    words = np.zeros((*shape, 3), dtype=np.int64)
-    triangles = Triangles(x, y, zeros, words, zeros[:, 0], zeros[:, 0])
+    triangles, frame = as_triangles(corners, size)
     drawn, rows, triangle, _ = Geometry(Grid()).rows(triangles, frame)
     kept = np.flatnonzero(rows.length)
-    own, found = drawn.source[triangle[kept]], np.zeros((2, size[1], size[0] + 1), dtype=np.int64)
-    for of, weight in zip(found, (np.ones_like(own), tags[own]), strict=True):
-        np.add.at(of, (rows.y[kept], rows.x[kept]), weight)
-        np.add.at(of, (rows.y[kept], rows.x[kept] + rows.length[kept]), -weight)
-    return found.cumsum(axis=2)[..., :-1]
+    own = drawn.source[triangle[kept]]
+    weights = np.ones_like(own), tags[own]
+    return painted(rows.x[kept], rows.y[kept], rows.length[kept], weights, size)
+
+
+@lru_cache(maxsize=1)
+def _geometry():
+    return GeometryUnit(None, Build(top="geometry"))
+
+
+def by_rtl(corners, tags, size):
+    """Number of triangles at each pixel, by the simulated RTL of the geometry."""
+    triangles, frame = as_triangles(corners, size)
+    run = simulate(_geometry(), triangles.beats, count=None, constants=frame.codes, engine="auto")
+    x, y, length = (run.beats[name].astype(np.int64) for name in ("x", "y", "length"))
+    return painted(x, y, length, [1], size)
 
 
 def by_rasteriser(corners, tags, size):

@@ -1,5 +1,6 @@
-"""The industry's rules of rasterisation, written anew as tests of the golden rasteriser and of the geometry's
-models, which the RTL equals bit for bit.
+"""The industry's rules of rasterisation, written anew as tests of the golden rasteriser and of the geometry.
+
+The geometry has models and RTL. The RTL equals the models bit for bit, and a part of the rules runs on it.
 
 - Khronos' fill rule: pixels of a shared edge are drawn once. The cases are those of its conformance tests
   (VK-GL-CTS, `functional.rasterization.fill_rules`): basic, reversed, clipped in part and in full, projected.
@@ -13,9 +14,10 @@ from itertools import product
 import numpy as np
 import pytest
 
-from .coverage import SIDE, by_geometry, by_rasteriser, in_cells, tags_of
+from .coverage import SIDE, by_geometry, by_rasteriser, by_rtl, in_cells, tags_of
 
 MODELS = [by_geometry, by_rasteriser]
+RTL = pytest.param(by_rtl, marks=[pytest.mark.long, pytest.mark.ci])
 SIZE = 96, 80
 
 
@@ -60,7 +62,7 @@ def inside(quad):
     return (found.min(axis=0) > 1) | (found.max(axis=0) < -1)
 
 
-@pytest.mark.parametrize("model", MODELS)
+@pytest.mark.parametrize("model", [*MODELS, RTL])
 @pytest.mark.parametrize("case", ["basic", "reversed", "clipped in part", "clipped in full", "projected"])
 def test_a_shared_edge_is_drawn_once(case, model):
     """No pixel of a quad is drawn twice, and none that is inside is missed."""
@@ -114,14 +116,21 @@ def mosaic(tiles, across):
     return tiles.reshape(across, across, rows, columns).swapaxes(1, 2).reshape(across * rows, -1)
 
 
-@pytest.mark.parametrize("across", [24, pytest.param(64, marks=[pytest.mark.long, pytest.mark.ci])])
-def test_one_of_eight_fill_conventions(across):
-    """The models hold the top-left rule, and random triangles tell it from each of the other seven."""
+@pytest.mark.parametrize(
+    ("across", "models"),
+    [
+        (24, MODELS),
+        pytest.param(64, MODELS, marks=[pytest.mark.long, pytest.mark.ci]),
+        pytest.param(24, [by_rtl], marks=[pytest.mark.long, pytest.mark.ci]),
+    ],
+)
+def test_one_of_eight_fill_conventions(across, models):
+    """Models and RTL hold the top-left rule. Random triangles tell it from each of the other seven."""
     corners, tags = in_cells(np.random.default_rng(across), across)
     cell = np.stack(np.meshgrid(*[np.arange(across)] * 2), axis=-1).reshape(-1, 1, 2)
     found = signs(corners - 256 * SIDE * cell, SIDE, SIDE)
     size = (across * SIDE,) * 2
-    drawn = [model(corners, tags, size)[0] for model in MODELS]
+    drawn = [model(corners, tags, size)[0] for model in models]
     held = [
         convention
         for convention in CONVENTIONS
@@ -138,7 +147,8 @@ def test_every_convention_draws_a_shared_edge_once(convention):
     assert tiles.reshape(3, 2, SIDE, SIDE).sum(axis=1).max() == 1
 
 
-def test_triangles_at_a_pixel_centre():
+@pytest.mark.parametrize("model", [*MODELS, RTL])
+def test_triangles_at_a_pixel_centre(model):
     """piglit's fixed cases: four right angles at a centre, moved by a step each way. One of four has it."""
     step, size, middle = 256 // 16, 3 * 16, 128
     for dx, dy in product((-step, 0, step), repeat=2):
@@ -147,8 +157,7 @@ def test_triangles_at_a_pixel_centre():
             [[[x + sx * size, y], [x, y + sy * size], [x, y]] for sx, sy in product((1, -1), repeat=2)]
         )
         # The centre is inside of the four together, on their edges, or beside them.
-        for model in MODELS:
-            assert model(corners, np.arange(1, 5), (4, 4))[0, 0, 0] == 1
+        assert model(corners, np.arange(1, 5), (4, 4))[0, 0, 0] == 1
 
 
 @pytest.mark.parametrize("across", [16, pytest.param(48, marks=[pytest.mark.long, pytest.mark.ci])])
