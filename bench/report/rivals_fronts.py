@@ -144,6 +144,12 @@ def _fronts_placed(points: Mapping[str, Mapping[str, Any]]) -> tuple[list[str], 
     return front("tables", "error"), front("tables", "multipliers", "error")
 
 
+def _left_out() -> str:
+    """A sentence on the methods of which a front of placed designs knows nothing."""
+    models = listed(name for name, rival in COMPARED.items() if not rival.HARDWARE)
+    return f"{models} are models without hardware, so this front leaves them out."
+
+
 def placed_table(of_mesh: Mapping[str, Frames]) -> Table:
     """Parts, clock rate and time of every placed method on every mesh, and whether it is on a front."""
     columns = ["method", "mesh", "look-up tables", "flip-flops", "multipliers", "block RAMs", "seeds"]
@@ -163,7 +169,7 @@ def placed_table(of_mesh: Mapping[str, Frames]) -> Table:
         "Committed placements of the methods that have hardware, with one light, out of context. "
         "`docs/guide/rivals.md` says which work on timing each design had. Cycles and errors are those of "
         f"the table of errors at exponent {DRAWN}. A method is on a front if no other method is at least as "
-        "good in all its numbers and better in one. Methods with R·V are not on a front."
+        f"good in all its numbers and better in one. Methods with R·V are not on a front. {_left_out()}"
     )
     return Table("rivals-placed", "Placed methods: tables times time", columns, rows, note)
 
@@ -211,7 +217,7 @@ def drawings(
     )
     placed = (
         "Look-up tables and median clock rates of committed placements. Multipliers are not in the drawing; "
-        "the table has them."
+        f"the table has them. {_left_out()}"
     )
     mesh, number, of_area = ", by mesh", ", by number of lights", "Error against area times time"
     of_bits, of_tables = "Error against switched bits", "Error against tables times time of placed designs"

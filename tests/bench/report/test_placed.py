@@ -40,6 +40,20 @@ def test_table_of_the_guide_is_the_store():
     assert len(rows) == len(plain)
 
 
+def test_table_of_the_readme_is_the_store():
+    """Parts of its designs, in the order of its columns. `renormalise` has its default interval."""
+    text = (GUIDE.parents[2] / "README.md").read_text(encoding="utf-8")
+    heads, cells = (
+        next(line for line in text.splitlines() if line.startswith(first)).split("|")[2:-1]
+        for first in ("| | `quotient`, `blinn` |", "| LUT, flip-flops, placed on an ECP5-25F |")
+    )
+    store = {entry["design"]: entry for entry in read_store() if entry["device"] == DEVICE}
+    for head, cell in zip(heads, cells, strict=True):
+        method, model = re.findall(r"`(\w+)`", head)
+        entry = store[f"pipeline {method}, {model}, 1 light{', one_minus_cosine' * ('N·H' in head)}"]
+        assert cell.strip() == f"{entry['luts']:,}, {entry['flip_flops']:,}", head
+
+
 def test_table_of_rivals_is_the_store():
     """Every placed row has the rates of the store and their number. Designs of no placement are not in it."""
     page = GUIDE.with_name("rivals.md").read_text(encoding="utf-8").partition("## Placed")[2]
@@ -59,7 +73,7 @@ def test_table_of_rivals_is_the_store():
         placed_rows += 1
         assert [int(rate) for rate in rates.split(", ")] == sorted(map(round, store[name])), name
         assert int(seeds) == len(store[name])
-    assert placed_rows == 14
+    assert placed_rows == 15
     assert {method for method, *_ in rows} >= {name.partition(",")[0] for name in RIVALS} - {
         "bishop-weimer-six"
     }

@@ -97,6 +97,7 @@ def test_times_of_placed_methods():
     found = placed_table({"teapot-1000": {name: [frame] for name in names}})
     rows = {row[0]: dict(zip(found.columns, row, strict=True)) for row in found.rows}
     assert "duff" not in rows
+    assert "`duff`, `bishop-weimer`, `bishop-weimer-six`, `loisel` and `abbas` are models" in found.note
     for name, design in (("quotient", "quotient"), ("renormalise, 3", "renormalise")):
         entries = [of for of in read_store() if of["design"] == f"pipeline {design}, blinn, 1 light"]
         entry = next(of for of in entries if of["device"] == DEVICE)
