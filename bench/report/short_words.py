@@ -61,7 +61,7 @@ def table_of(tasks: Sequence[Task], results: Sequence[dict[str, Any]]) -> Table:
     rows: list[list[Cell]] = [
         [
             task.settings["words"],
-            task.settings["mesh"].partition("-")[0],
+            "teapot" if task.settings["mesh"].startswith("teapot") else "torus",
             found["triangles"],
             *found["errors"],
         ]
