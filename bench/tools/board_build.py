@@ -16,6 +16,7 @@ from amaranth.hdl import Elaboratable
 
 from blysk.bench.tools.absorb_registers import absorb_registers, text_of_step
 from blysk.bench.tools.boards import Board, packages_missing
+from blysk.bench.tools.carry_starts import start_carries, text_of_carries
 from blysk.bench.tools.families import ECP5, signal_name
 from blysk.bench.tools.kept_builds import KeptBuild
 from blysk.bench.tools.memory_map import MemoryMap, ScenePatterns, blocks_of_netlist, carrying, memory_words
@@ -273,7 +274,7 @@ def build(
             (folder / file).write_bytes(text)
         script = _script(rates["sync"])
         options = repr((board.options, _LAYOUT, _SETTINGS, versions_of(ECP5)))
-        step = text_of_step()
+        step = text_of_step() + text_of_carries()
         kept = KeptBuild((given.netlist, given.constraints, script, options, step))
         progress("mapping")
         if not kept.take(folder, "netlist.json"):
@@ -281,6 +282,7 @@ def build(
             kept.keep(folder, "netlist.json")
         mapped = json.loads((folder / "netlist.json").read_text(encoding="utf-8"))
         mapped, absorbed = absorb_registers(mapped)
+        start_carries(mapped)
         mapped["modules"]["top"]["settings"] = _SETTINGS
         (folder / "top.json").write_text(json.dumps(mapped), encoding="utf-8")
         refuse_too_large(board, mapped)

@@ -1,6 +1,6 @@
 """Data-flow graphs, which describe a unit's words by functions and make the hardware of the words."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from functools import cache, partial, reduce
 from operator import mul, or_
@@ -23,6 +23,7 @@ __all__ = [
     "Dataflow",
     "FunctionalUnit",
     "checked_interval",
+    "merged",
     "registered_product",
 ]
 
@@ -122,7 +123,8 @@ class Dataflow:
             self._schedule = place(self._words, self.interval, self.spaced)
         return self._schedule
 
-    def _add(self, word: Word) -> Word:
+    def add(self, word: Word) -> Word:
+        """Add a word that has been described elsewhere, behind its operands."""
         if self._schedule is not None:
             raise RuntimeError(f"{word.name} comes after the words were placed")
         word.graph = self
@@ -137,13 +139,13 @@ class Dataflow:
         first = 0 if self.interval == 1 else 1
         word = Word(name, (), 0, self.interval, since=first, text=formula or SYMBOLS.get(name, name))
         word.make = lambda build: read(build.operands)
-        return self._add(word)
+        return self.add(word)
 
     def wire(self, name: str, function: Callable[[Any], Any], word: Word, formula: str | None = None) -> Word:
         """Wiring from a word's value. A copy for a later stage holds the wired value, not its source."""
         wire = Word(name, (word,), 0, word.lifetime, text=formula, trace=traced(function))
         wire.make = lambda build: function(build.at(word, wire.read))
-        return self._add(wire)
+        return self.add(wire)
 
     def register(
         self,
@@ -176,7 +178,7 @@ class Dataflow:
             return build.unit.register(build.m, value, name, when=build.when(register.read))
 
         register.make = make
-        return self._add(register)
+        return self.add(register)
 
     def share(
         self, name: str, shapes: Sequence[ShapeLike], latency: int, make: Callable[..., Any]
@@ -226,7 +228,7 @@ class Dataflow:
             return result(build.issue(functional_unit, use, given))
 
         use.make = make
-        return self._add(use)
+        return self.add(use)
 
     def multiply(
         self,
@@ -323,7 +325,7 @@ class Dataflow:
             return build.unit.register(build.m, port.data, f"{name}_word") if registered else port.data
 
         word.make = make
-        return self._add(word)
+        return self.add(word)
 
     def build(self, m: Module, unit: PipelinedUnit, operands: Any) -> Callable[..., Any]:
         """Make the hardware. Return the function `_Build.at`, which gives a word's value at a stage.
@@ -385,6 +387,8 @@ class _Build:
     def __init__(self, graph: Dataflow, m: Module, unit: PipelinedUnit, operands: Any):
         self.graph, self.m, self.unit, self.operands = graph, m, unit, operands
         self.values: dict[Word, dict[int, Any]] = {}
+        # Further hardware of several words, by the resource of the words.
+        self.shared: dict[Any, Any] = {}
         self._instances: dict[tuple[FunctionalUnit, int], tuple[list[Signal], Any]] = {}
         self._turn_of = cache(partial(turn_of, m))
         self._issued: dict[tuple[FunctionalUnit, int], list[tuple[Value | None, Sequence[Any]]]] = {}
@@ -431,17 +435,32 @@ class _Build:
         self._issued.setdefault(key, []).append((when, operands))
         return self._instances[key][1]
 
+    def result(self, functional_unit: FunctionalUnit, instance: int) -> Any:
+        """Result of an instance of a functional unit, on every cycle."""
+        return self._instances[functional_unit, instance][1]
+
     def connect(self) -> None:
-        """Connect each instance's operand registers, which have no enable.
+        """Connect shared hardware, and each instance's operand registers, which have no enable.
 
         No two uses fall on the same cycle, so their operands are gated and merged by OR. A chain with a
         multiplexer for each use would be larger.
         """
+        for hardware in self.shared.values():
+            hardware.connect()
         for key, uses in self._issued.items():
             for k, to in enumerate(self._instances[key][0]):
-                values = [(when, Value.cast(operands[k])) for when, operands in uses]
-                if len(values) == 1:
-                    self.m.d.sync += Value.cast(to).eq(values[0][1])
-                    continue
-                gated = [Mux(when, value, 0) for when, value in values]
-                self.m.d.sync += Value.cast(to).eq(reduce(or_, gated))
+                value = merged((when, Value.cast(operands[k])) for when, operands in uses)
+                self.m.d.sync += Value.cast(to).eq(value)
+
+
+def merged(uses: Iterable[tuple[Value | None, Value]]) -> Value:
+    """The value whose condition is high. Values are gated, and merged by OR. A single value is not gated.
+
+    Conditions of the same value, the same object of Python, are merged first.
+    """
+    sources: dict[int, tuple[Value, list[Value | None]]] = {}
+    for when, value in uses:
+        sources.setdefault(id(value), (value, []))[1].append(when)
+    if len(sources) == 1:
+        return next(iter(sources.values()))[0]
+    return reduce(or_, (Mux(reduce(or_, whens), value, 0) for value, whens in sources.values()))

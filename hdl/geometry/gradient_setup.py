@@ -7,6 +7,7 @@ from blysk.golden.geometry.gradient_setup import GradientSetup
 from blysk.golden.geometry.plane_setup import PlaneSetup
 from blysk.golden.geometry.triangles import ATTRIBUTE
 from blysk.golden.number.fixed import SQ
+from blysk.hdl.core.accumulator import Accumulator
 from blysk.hdl.core.dataflow import Dataflow
 from blysk.hdl.core.fixed import FixedShape, FixedValue
 from blysk.hdl.core.pipelined_unit import PipelinedUnit
@@ -18,6 +19,9 @@ __all__ = ["LEAST_BITS", "GradientSetupUnit", "attribute_shape", "gradient_shape
 
 LEAST_BITS = 12
 """Bits of the bound `AttributeSerialiser.least`."""
+
+_PRODUCTS = 12
+"""Multiplications of an attribute."""
 
 _ROUND = 1
 """Further bits of a shifted word, for its rounding."""
@@ -41,9 +45,10 @@ class GradientSetupUnit(PipelinedUnit):
     """Start and steps of an attribute. `GradientSetup` is the bit-accurate model.
 
     Let I be the initiation interval. The twelve multiplications of an attribute take turns at ``ceil(12 /
-    I)`` multipliers of 18x18 bits: 3 for an interval of 4, 1 for 12. Three words take turns at a shifter. The
-    sum of the start takes four turns at an accumulator, with two bits of both factors in each turn. The
-    latency, `latency`, follows from the schedule: 39 cycles for an interval of 4, 51 for 12.
+    I)`` multipliers of 18x18 bits: 3 for an interval of 4, 1 for 12. With one multiplier most sums of
+    products take turns at an adder. Three words take turns at a shifter. The sum of the start takes four
+    turns at an accumulator, with two bits of both factors in each turn. The latency, `latency`, follows from
+    the schedule: 39 cycles for an interval of 4, 51 for 12.
 
     Parameters
     ----------
@@ -83,6 +88,7 @@ class GradientSetupUnit(PipelinedUnit):
         """Words of the results."""
         g, p = self._graph, GradientSetup
         point = p.PRODUCT_FORMAT.fraction_bits
+        sums = Accumulator(g) if g.interval >= _PRODUCTS else None
         first, middle, last, reciprocal, knee, width, row_shift, column_shift, fraction, right = (
             g.input(name, lambda operands, name=name: operands[name])
             for name in (
@@ -101,14 +107,15 @@ class GradientSetupUnit(PipelinedUnit):
             PlaneSetup.RECIPROCAL_LOW,
             point,
             p.PRODUCT_FORMAT,
+            sums,
         )
         at_knee = wide_product(
-            g, "at_knee", along, knee, p.PRODUCT_LOW, PlaneSetup.HEIGHT_LOW, point, lambda value: value
+            g, "at_knee", along, knee, p.PRODUCT_LOW, PlaneSetup.HEIGHT_LOW, point, lambda value: value, sums
         )
         rise = g.register("rise", lambda a, b: (b - a).extend(SQ(3, point)), first, middle, since=at_knee)
         across = g.register("across", lambda a, b: (a - b).saturate(p.PRODUCT_FORMAT), rise, at_knee)
         inward = wide_product(
-            g, "inward_word", across, width, p.PRODUCT_LOW, p.WIDTH_LOW, point, p.PRODUCT_FORMAT
+            g, "inward_word", across, width, p.PRODUCT_LOW, p.WIDTH_LOW, point, p.PRODUCT_FORMAT, sums
         )
         f = g.wire("fraction_word", lambda f: FixedValue(p.FRACTION_FORMAT, Cat(Const(1, 1), f)), fraction)
         high, crossed = three_products(g, "part", f, inward, p.FRACTION_LOW, p.PRODUCT_LOW, 40)

@@ -22,7 +22,7 @@ from blysk.hdl.video.draw_commands import DrawCommandsUnit
 from blysk.hdl.video.mesh_memory import MeshMemoryUnit
 from blysk.hdl.video.motion import MotionUnit
 from blysk.hdl.video.triangle_assembly import TriangleAssemblyUnit
-from blysk.hdl.video.vertex_unit import VertexUnit, matrix_shape
+from blysk.hdl.video.vertex_unit import VertexUnit
 
 __all__ = ["STATUS", "DrawUnit", "band_shape", "drawn_band_pixel_shape", "load_shape"]
 
@@ -119,6 +119,7 @@ class DrawUnit(wiring.Component):
         for name in ("render", "depth", "mesh", "commands", "vertex", "assembly", "motion", "controls"):
             m.submodules[name] = getattr(self, name)
         render, drawn = self.render, self.render.o
+        connect(m, self.motion.o, self.vertex.write)
         connect(m, self.mesh.o, self.vertex.i)
         connect(m, self.vertex.o, self.assembly.write)
         connect(m, self.assembly.o, render.i)
@@ -129,21 +130,8 @@ class DrawUnit(wiring.Component):
             drawn.ready.eq(self.pixels.ready),
             self.controls.buttons.eq(self.buttons),
         ]
-        self._matrix(m)
         self._band(m)
         return m
-
-    def _matrix(self, m: Module) -> None:
-        """Write the registers of the matrix, one after the other."""
-        matrix = Signal(matrix_shape(), name="matrix")
-        given = self.motion.o.payload
-        words = [word for name in ("position", "normal") for row in matrix[name] for word in row]
-        words[9:9] = list(matrix.offset)
-        m.d.comb += [self.vertex.constants.eq(matrix), self.motion.o.ready.eq(1)]
-        for index, word in enumerate(words):
-            with m.If(self.motion.o.valid & (given.index == index)):
-                code = Value.cast(word)
-                m.d.sync += code.eq(Value.cast(given.value)[: len(code)])
 
     def _band(self, m: Module) -> None:
         """Draw one band after the other."""

@@ -1,13 +1,20 @@
 """Vertex unit: a vertex times a matrix, its perspective division, and its place on the screen."""
 
+from collections.abc import Sequence
+
 from amaranth.hdl import Cat, Const, Mux, Signal, Value, unsigned
-from amaranth.lib import data
+from amaranth.lib import data, stream
+from amaranth.lib.memory import Memory
+from amaranth.lib.wiring import In
 
 from blysk.golden.albedo.attribute_spans import AttributeSpans
 from blysk.golden.geometry.reciprocal import Reciprocal
 from blysk.golden.geometry.triangles import ATTRIBUTE, DEPTH, GRID, Grid
+from blysk.golden.number.fixed import SQ
 from blysk.golden.number.unit_vector import COMPONENT, ONE
+from blysk.golden.video.motion import ENTRIES
 from blysk.golden.video.vertex_unit import ENTRY, OFFSET, WEIGHT, VertexTransform
+from blysk.hdl.core.accumulator import Accumulator, half
 from blysk.hdl.core.dataflow import Dataflow
 from blysk.hdl.core.fixed import FixedShape, FixedValue
 from blysk.hdl.core.pipelined_unit import PipelinedUnit
@@ -17,16 +24,15 @@ from blysk.hdl.core.word import Word
 from blysk.hdl.geometry.reciprocal import reciprocal_word, shared_table
 from blysk.hdl.geometry.surface_words import surface_count
 from blysk.hdl.geometry.wide_product import wide_product
+from blysk.hdl.video.motion import entry_shape
 
-__all__ = ["VertexUnit", "matrix_shape", "mesh_vertex_shape", "screen_vertex_shape"]
+__all__ = ["VertexUnit", "mesh_vertex_shape", "screen_vertex_shape"]
 
+_SUM = SQ(6, 33)
+"""Format of the sum of a row's products and an offset, all exact."""
 
-def matrix_shape() -> data.StructLayout:
-    """Shape of `Matrix.codes`."""
-    rows = data.ArrayLayout(data.ArrayLayout(FixedShape(ENTRY), 3), 3)
-    return data.StructLayout(
-        {"position": rows, "offset": data.ArrayLayout(FixedShape(OFFSET), 3), "normal": rows}
-    )
+_SHIFTED = 26
+"""Fraction bits of a sum before it is shifted."""
 
 
 def mesh_vertex_shape(index_bits: int, surface: AttributeSpans | None = None) -> data.StructLayout:
@@ -55,8 +61,8 @@ def screen_vertex_shape(grid: Grid = GRID, surface: AttributeSpans | None = None
 class VertexUnit(PipelinedUnit):
     """Transforms vertices. `VertexTransform` is the bit-accurate model.
 
-    The latency is the attribute ``latency``. With one multiplier the initiation interval is
-    `VertexTransform.cycles`.
+    The latency is the attribute ``latency``. There is one multiplier, and one adder for sums of products. So
+    the initiation interval is `VertexTransform.cycles`.
 
     Parameters
     ----------
@@ -64,9 +70,6 @@ class VertexUnit(PipelinedUnit):
         Bit-accurate model.
     index_bits : int
         Bits of the index that goes with a vertex.
-    initiation_interval : int, optional
-        Cycles from a vertex to the next, 15 or more. An interval of 15 takes two multipliers. By default
-        those of one multiplier.
 
     Members
     -------
@@ -74,70 +77,89 @@ class VertexUnit(PipelinedUnit):
         Vertices of a mesh.
     o : :py:`Out(stream.Signature({"index", "vertex": screen_vertex_shape(grid, surface)}))`
         The same vertices on the screen.
-    constants : :py:`In(matrix_shape())`
-        The matrix, constant while vertices are inside.
+    write : :py:`In(stream.Signature(entry_shape()))`
+        Entries of the matrix, while no vertex is inside. They are accepted at once.
 
     Source: docs/theory/video.md#vertices; not in the documents.
     """
 
-    def __init__(
-        self,
-        model: VertexTransform | None = None,
-        index_bits: int = 9,
-        initiation_interval: int | None = None,
-    ):
+    def __init__(self, model: VertexTransform | None = None, index_bits: int = 9):
         self.model = model or VertexTransform()
-        initiation_interval = initiation_interval or self.model.cycles
-        if initiation_interval < 15:
-            raise ValueError(f"initiation_interval must be at least 15, not {initiation_interval}")
-        self._graph = Dataflow(initiation_interval)
+        self._graph = Dataflow(self.model.cycles)
+        self._sums = Accumulator(self._graph)
         self._results = self._describe()
-        self.multipliers = self._graph.multiplier.count
         surface = self.model.surface
         vertex = screen_vertex_shape(self.model.grid, surface)
         super().__init__(
             mesh_vertex_shape(index_bits, surface),
             data.StructLayout({"index": unsigned(index_bits), "vertex": vertex}),
             latency=max(word.stage for word in self._results.values()),
-            initiation_interval=initiation_interval,
-            constants=matrix_shape(),
+            initiation_interval=self.model.cycles,
+            ports={"write": In(stream.Signature(entry_shape()))},
         )
 
-    def _rows(self, name: str, vector: Word, row: int, finish) -> Word:
-        """Multiply a matrix's row and a vector, sum the products, and apply ``finish``."""
-        g, matrix = self._graph, name.split("_")[0]
-        products = [
-            g.multiply(
-                f"{name}_{k}",
-                vector,
-                vector,
-                lambda v, k=k: v[k],
-                lambda _, k=k: getattr(self.constants, matrix)[row][k],
+    def _row(self, name: str, vector: Sequence[Word], first: int, begin=None) -> Word:
+        """Sum in `_SUM` of the products of a vector and three entries of the matrix.
+
+        ``begin`` makes the number with which the sum begins. By default it is half a step of `COMPONENT`.
+        """
+        g = self._graph
+        products = []
+        for k, component in enumerate(vector):
+            entry = g.use(
+                self._matrix,
+                f"{name}_entry_{k}",
+                (),
+                lambda k=k: (first + k,),
+                lambda found: found[0],
+                since=2,
             )
-            for k in range(3)
-        ]
-        partial = g.register(f"{name}_partial", lambda a, b: a + b, *products[:2])
-        return g.register(f"{name}_total", lambda a, b: finish(a, b), partial, products[2])
+            products.append(g.multiply(f"{name}_{k}", component, entry))
+        begin = half(COMPONENT.fraction_bits) if begin is None else begin(products[0])
+        return self._sums.sum(f"{name}_sum", products, _SUM, begin)
+
+    def _entries(self, register, index: Value) -> tuple[FixedValue, FixedValue]:
+        """The word of the matrix at an index: as entry, and as offset with half a step of X, Y and W."""
+        port = self._memory.read_port(domain="comb")
+        self._module.d.comb += port.addr.eq(index)
+        below = self.model.SPACE.fraction_bits + 1 - OFFSET.fraction_bits
+        rounded = SQ(OFFSET.integer_bits, OFFSET.fraction_bits + below)
+        return (
+            FixedValue(ENTRY, port.data[: ENTRY.width]),
+            FixedValue(rounded, Cat(Const(1, below), port.data)),
+        )
 
     def _describe(self) -> dict[str, Word]:
         """Words of the results."""
         g, p = self._graph, self.model
         position, normal = (
-            g.input(name, lambda operands, name=name: operands[name]) for name in ("position", "normal")
+            [g.wire(f"{name}_{k}", lambda v, k=k: v[k], word) for k in range(3)]
+            for name, word in (
+                (name, g.input(name, lambda operands, name=name: operands[name]))
+                for name in ("position", "normal")
+            )
         )
         index = g.input("index", lambda operands: operands.index)
         places, bits = p.SPACE.fraction_bits, p.SPACE.width
+        self._matrix = g.share("matrix", (unsigned((ENTRIES - 1).bit_length()),), 0, self._entries)
 
-        def space(row):
-            def finish(partial, last):
-                total = (partial + last) + self.constants.offset[row]
-                return total.round_half_up(places).wrap(p.SPACE)
+        # The rows come first, so that the products of a row come one after the other.
+        def space(name, row):
+            def begin(product):
+                # The offset is read when the first product is there.
+                return g.use(
+                    *(self._matrix, f"{name}_offset", (), lambda: (9 + row,), lambda found: found[1]),
+                    since=product,
+                )
 
-            return finish
+            return self._row(name, position, 3 * row, begin)
 
-        w = self._rows("position_w", position, 2, space(2))
-        x, y = (self._rows(f"position_{name}", position, row, space(row)) for row, name in enumerate("xy"))
-        code = g.register("w_held", lambda w: Value.cast(w), w)
+        w = g.register("w_word", lambda v: v.truncate(places).wrap(p.SPACE), space("w", 2))
+        turned = [
+            g.register(f"turned_{k}", _component, self._row(f"normal_{k}", normal, 12 + 3 * k))
+            for k in range(3)
+        ]
+        code = g.wire("w_code", lambda w: Value.cast(w), w)
         outside = g.register(
             "beyond", lambda c: c[-1] | ~c[places:-1].any() | c[places + p.SHIFTS + 1 : -1].any(), code
         )
@@ -155,25 +177,23 @@ class VertexUnit(PipelinedUnit):
         table = shared_table(g, lambda: self._module)
         r = reciprocal_word(g, table, "reciprocal", m)
         words = {"index": index}
-        for name, value in (("x", x), ("y", y)):
+
+        def shifted(total, shift):
+            # All words over W are in the same bits of the accumulator, so they share the shifter behind it.
+            return Value.cast(total.truncate(_SHIFTED)) >> shift
+
+        for row, name in enumerate("xy"):
             moved = g.register(
                 f"{name}_moved",
-                lambda v, s: FixedValue(p.SPACE, (Value.cast(v) >> s)[:bits].as_signed()),
-                value,
+                lambda v, s: FixedValue(p.SPACE, shifted(v, s)[_SHIFTED - places :][:bits]),
+                space(name, row),
                 shift,
             )
-            product = wide_product(
-                g,
-                f"{name}_place",
-                moved,
-                r,
-                p.X_LOW,
-                p.RECIPROCAL_LOW,
-                p.place.fraction_bits + p.GUARD,
-                lambda value: value,
-            )
-            rounded = g.register(
-                f"{name}_rounded", lambda value: value.round_half_up(p.place.fraction_bits), product
+            point = p.place.fraction_bits + p.GUARD
+            rounded = wide_product(
+                *(g, f"{name}_rounded", moved, r, p.X_LOW, p.RECIPROCAL_LOW, point),
+                lambda value: value.round_half_up(p.place.fraction_bits),
+                self._sums,
             )
             words[name] = g.register(f"{name}_word", lambda value: value.saturate(p.place), rounded)
             words[f"{name}_over"] = g.register(f"{name}_over", self._over, rounded)
@@ -188,27 +208,27 @@ class VertexUnit(PipelinedUnit):
             r,
         )
 
-        def over_w(name, scaled, read):
-            rounded = g.register(f"scaled_{name}_rounded", lambda v: v.round_half_up(26), scaled)
-            words[read] = g.register(
-                f"{read}_word",
-                lambda v, s: (Value.cast(v) >> s)[26 - ATTRIBUTE.fraction_bits :][: ATTRIBUTE.width],
+        def over_w(name, scaled):
+            rounded = self._sums.sum(f"{name}_scaled", [scaled], _SUM, half(_SHIFTED))
+            words[name] = g.register(
+                f"{name}_word",
+                lambda v, s: shifted(v, s)[_SHIFTED - ATTRIBUTE.fraction_bits :][: ATTRIBUTE.width],
                 rounded,
                 shift,
             )
 
         for k in range(3):
-            turned = self._rows(f"normal_{k}", normal, k, _component)
-            over_w(k, g.multiply(f"scaled_{k}", turned, factor), f"normal_{k}")
+            over_w(f"normal_{k}", g.multiply(f"scaled_{k}", turned[k], factor))
         if p.surface is None:
             return words
         attributes = g.input("attributes", lambda operands: operands.attributes)
         for k in range(p.surface.attributes):
-            product = g.multiply(f"surface_{k}_scaled", attributes, factor, lambda v, k=k: v[k])
-            over_w(f"surface_{k}", product, f"surface_{k}")
+            attribute = g.wire(f"surface_{k}_given", lambda v, k=k: v[k], attributes)
+            product = g.multiply(f"surface_{k}_scaled", attribute, factor)
+            over_w(f"surface_{k}", product)
         weight = FixedValue(COMPONENT, Const(WEIGHT, COMPONENT.width).as_signed())
         product = g.multiply("weight_scaled", factor, factor, lambda _: weight)
-        over_w("weight", product, f"surface_{p.surface.attributes}")
+        over_w(f"surface_{p.surface.attributes}", product)
         return words
 
     def _over(self, rounded: FixedValue) -> Value:
@@ -217,8 +237,16 @@ class VertexUnit(PipelinedUnit):
         return above.any() & ~above.all()
 
     def datapath(self, m, operands):
-        """Describe the registers of the graph, and read its results in the last stage."""
+        """Describe memory and registers of the graph, and read its results in the last stage."""
         self._module = m
+        m.submodules.matrix = self._memory = Memory(shape=OFFSET.width, depth=ENTRIES, init=[])
+        write = self._memory.write_port()
+        m.d.comb += [
+            write.addr.eq(self.write.payload.index),
+            write.data.eq(Value.cast(self.write.payload.value)),
+            write.en.eq(self.write.valid),
+            self.write.ready.eq(1),
+        ]
         read = self._graph.build(m, self, operands)
         value = {name: read(word, self.latency) for name, word in self._results.items()}
         result = Signal(self.o.payload.shape(), name="result")
@@ -238,9 +266,8 @@ class VertexUnit(PipelinedUnit):
         return result
 
 
-def _component(partial: FixedValue, last: FixedValue) -> FixedValue:
+def _component(total: FixedValue) -> FixedValue:
     """A component of a unit vector from a sum, clipped to -ONE and ONE."""
-    value = (partial + last).round_half_up(COMPONENT.fraction_bits)
-    code = Value.cast(value)
+    code = Value.cast(total.truncate(COMPONENT.fraction_bits))
     clipped = Mux(code > ONE, ONE, Mux(code < -ONE, -ONE, code))
     return FixedValue(COMPONENT, clipped[: COMPONENT.width].as_signed())

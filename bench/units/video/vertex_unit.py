@@ -10,7 +10,7 @@ from blysk.bench.units.sample import Sample
 from blysk.golden.albedo.attribute_spans import AttributeSpans
 from blysk.golden.number.fixed import Fixed
 from blysk.golden.number.unit_vector import COMPONENT, ONE
-from blysk.golden.video.motion import rotation
+from blysk.golden.video.motion import ENTRIES, rotation
 from blysk.golden.video.vertex_unit import ENTRY, OFFSET, WEIGHT, Matrix, VertexTransform
 from blysk.hdl.video.vertex_unit import VertexUnit
 
@@ -29,12 +29,19 @@ def any_matrix(rng: np.random.Generator, distance: float = 1.4, size: float = 0.
     return Matrix(position, Fixed.round(OFFSET, offset).codes, normal)
 
 
-def _matrix(constants) -> Matrix:
-    return Matrix(**{name: np.asarray(codes) for name, codes in constants.items()})
+def _writes(matrix: Matrix) -> dict[str, np.ndarray]:
+    """Beats that write a matrix. Entries of the bench have the bits that `Motion` gives them."""
+    parts = matrix.position.ravel(), matrix.offset, matrix.normal.ravel()
+    return {"index": np.arange(ENTRIES), "value": np.concatenate(parts)}
+
+
+def _matrix(write) -> Matrix:
+    position, offset, normal = np.split(write["value"], (9, 12))
+    return Matrix(position.reshape(3, 3), offset, normal.reshape(3, 3))
 
 
 def _expect(unit, case):
-    given = case.beats["position"], case.beats["normal"], _matrix(case.constants)
+    given = case.beats["position"], case.beats["normal"], _matrix(case.write)
     made = unit.model.compute(*given, case.beats.get("attributes"))
     return {"index": case.beats["index"], "vertex": made.beats}
 
@@ -48,7 +55,7 @@ def _case(unit, rng, count, matrix):
     beats["normal"] = unit_codes(rng, count)
     if (surface := unit.model.surface) is not None:
         beats["attributes"] = rng.integers(-WEIGHT, WEIGHT + 1, (count, surface.attributes))
-    return Case(beats, matrix.codes)
+    return Case(beats, write=_writes(matrix))
 
 
 def _inside(unit, rng, count):
@@ -90,7 +97,6 @@ RECORD = Record(
         "one multiplier": Variant(
             VertexUnit, _measure, "vertices inside", note="error of the column, in 1/256 pixel"
         ),
-        "two multipliers": Variant(partial(VertexUnit, None, 10, 15), long=True),
         "colours and coordinates": Variant(
             partial(VertexUnit, VertexTransform(surface=AttributeSpans(True, True))), long=True
         ),
