@@ -125,7 +125,7 @@ class _Adder:
             shift: self._extended(product[-shift:].as_signed() if shift < 0 else product, max(shift, 0))
             for _, shift in self._products
         }
-        term = merged((when, placed[shift]) for when, shift in self._products)
+        term = merged([(when, placed[shift]) for when, shift in self._products])
         with m.If(reduce(or_, (when for when, _ in self._products))):
             m.d.sync += self.total.eq(term + merged(self._others))
 

@@ -1,6 +1,6 @@
 """Data-flow graphs, which describe a unit's words by functions and make the hardware of the words."""
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cache, partial, reduce
 from operator import mul, or_
@@ -86,6 +86,8 @@ class Dataflow:
         Whether a product has one register behind its operand registers, and so takes two cycles in all.
     memories : bool
         Whether wide words with a long delay wait in memories of look-up tables. This needs an interval of 1.
+    merges : bool
+        Whether uses of a functional unit with the same operand share its gates.
 
     Raises
     ------
@@ -96,13 +98,19 @@ class Dataflow:
     """
 
     def __init__(
-        self, interval: int, *, spaced: bool = False, low_latency: bool = False, memories: bool = False
+        self,
+        interval: int,
+        *,
+        spaced: bool = False,
+        low_latency: bool = False,
+        memories: bool = False,
+        merges: bool = False,
     ):
         if interval < 1:
             raise ValueError(f"interval must be at least 1, not {interval}")
         self.interval = interval
         self.spaced = spaced
-        self.memories = memories and interval == 1
+        self.memories, self.merges = memories and interval == 1, merges
         self._words: list[Word] = []
         self._schedule: Schedule | None = None
         latency, product = MULTIPLIER_LATENCY, registered_product
@@ -449,18 +457,19 @@ class _Build:
             hardware.connect()
         for key, uses in self._issued.items():
             for k, to in enumerate(self._instances[key][0]):
-                value = merged((when, Value.cast(operands[k])) for when, operands in uses)
+                values = [(when, Value.cast(operands[k])) for when, operands in uses]
+                value = merged(values, self.graph.merges)
                 self.m.d.sync += Value.cast(to).eq(value)
 
 
-def merged(uses: Iterable[tuple[Value | None, Value]]) -> Value:
+def merged(uses: Sequence[tuple[Value | None, Value]], merges: bool = True) -> Value:
     """The value whose condition is high. Values are gated, and merged by OR. A single value is not gated.
 
-    Conditions of the same value, the same object of Python, are merged first.
+    With ``merges`` the conditions of a value, the same object of Python, are merged first.
     """
     sources: dict[int, tuple[Value, list[Value | None]]] = {}
-    for when, value in uses:
-        sources.setdefault(id(value), (value, []))[1].append(when)
+    for number, (when, value) in enumerate(uses):
+        sources.setdefault(id(value) if merges else number, (value, []))[1].append(when)
     if len(sources) == 1:
         return next(iter(sources.values()))[0]
     return reduce(or_, (Mux(reduce(or_, whens), value, 0) for value, whens in sources.values()))

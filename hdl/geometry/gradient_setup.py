@@ -73,7 +73,8 @@ class GradientSetupUnit(PipelinedUnit):
     def __init__(self, initiation_interval: int = 4):
         if initiation_interval < 4:
             raise ValueError(f"initiation_interval must be at least 4, not {initiation_interval}")
-        self._graph = Dataflow(initiation_interval)
+        self._single = initiation_interval >= _PRODUCTS
+        self._graph = Dataflow(initiation_interval, merges=self._single)
         self._results = self._describe()
         self.multipliers = self._graph.multiplier.count
         super().__init__(
@@ -88,7 +89,7 @@ class GradientSetupUnit(PipelinedUnit):
         """Words of the results."""
         g, p = self._graph, GradientSetup
         point = p.PRODUCT_FORMAT.fraction_bits
-        sums = Accumulator(g) if g.interval >= _PRODUCTS else None
+        sums = Accumulator(g) if self._single else None
         first, middle, last, reciprocal, knee, width, row_shift, column_shift, fraction, right = (
             g.input(name, lambda operands, name=name: operands[name])
             for name in (

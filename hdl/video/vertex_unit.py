@@ -85,7 +85,7 @@ class VertexUnit(PipelinedUnit):
 
     def __init__(self, model: VertexTransform | None = None, index_bits: int = 9):
         self.model = model or VertexTransform()
-        self._graph = Dataflow(self.model.cycles)
+        self._graph = Dataflow(self.model.cycles, merges=True)
         self._sums = Accumulator(self._graph)
         self._results = self._describe()
         surface = self.model.surface
