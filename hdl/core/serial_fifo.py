@@ -16,10 +16,9 @@ def connect_serial_fifo(
 ) -> None:
     """Connect two streams through a FIFO whose payloads are written and read in parts, one a cycle.
 
-    A payload of p parts is accepted p cycles after it was offered, because its parts are written from the
-    source. It is offered p + 2 cycles after another was taken or later. So the FIFO serves streams whose
-    payloads come seldom. From the source's ready a payload takes p + 2 cycles through the empty FIFO. The
-    source's ready and the sink's valid depend on registers alone.
+    A payload of p parts is accepted p + 1 cycles after another or later. It is offered p + 2 cycles after
+    another was taken or later. So the FIFO serves streams whose payloads come seldom. A payload takes 2 p + 2
+    cycles through the empty FIFO. The source's ready and the sink's valid depend on registers alone.
 
     Parameters
     ----------
@@ -47,23 +46,22 @@ def connect_serial_fifo(
         raise ValueError(f"words must be a power of two from {2 * parts} on, not {words}")
     m.submodules[name] = memory = Memory(shape=bits, depth=words, init=[])
     port = memory.write_port()
-    payload = Value.cast(source.payload)
+    payload = Signal(width, name=f"{name}_payload", reset_less=True)
     writes, free = Signal(name=f"{name}_writes"), Signal(name=f"{name}_free", init=1)
     turn, step = Signal(range(parts), name=f"{name}_turn"), Signal(range(parts + 1), name=f"{name}_step")
     # Whole payloads in the memory. A payload counts until its last word is read.
     level, there = Signal(range(room + 1), name=f"{name}_level"), Signal(name=f"{name}_there")
-    came, gone, last = (Signal(name=f"{name}_{which}") for which in ("came", "gone", "last"))
+    came, gone = Signal(name=f"{name}_came"), Signal(name=f"{name}_gone")
     m.d.comb += [
-        last.eq(turn == parts - 1),
-        source.ready.eq(writes & last),
-        came.eq(source.ready & source.valid),
+        source.ready.eq(free & ~writes),
         port.data.eq(Array(payload[k * bits : (k + 1) * bits] for k in range(parts))[turn]),
         port.en.eq(writes),
+        came.eq(writes & (turn == parts - 1)),
     ]
-    with m.If(writes), m.If(~last | source.valid):
-        m.d.sync += [turn.eq(Mux(last, 0, turn + 1)), port.addr.eq(port.addr + 1), writes.eq(~last)]
+    with m.If(writes):
+        m.d.sync += [turn.eq(Mux(came, 0, turn + 1)), port.addr.eq(port.addr + 1), writes.eq(~came)]
     with m.Else():
-        m.d.sync += writes.eq(source.valid & free)
+        m.d.sync += [payload.eq(source.payload), writes.eq(source.valid & free)]
     # ``free`` is a cycle late, so it keeps a place for the payload that was just written.
     m.d.sync += [level.eq(level + came - gone), free.eq(level < room - 1)]
 

@@ -159,6 +159,7 @@ class VertexUnit(PipelinedUnit):
             g.register(f"turned_{k}", _component, self._row(f"normal_{k}", normal, 12 + 3 * k))
             for k in range(3)
         ]
+        totals = [space(name, row) for row, name in enumerate("xy")]
         code = g.wire("w_code", lambda w: Value.cast(w), w)
         outside = g.register(
             "beyond", lambda c: c[-1] | ~c[places:-1].any() | c[places + p.SHIFTS + 1 : -1].any(), code
@@ -182,11 +183,11 @@ class VertexUnit(PipelinedUnit):
             # All words over W are in the same bits of the accumulator, so they share the shifter behind it.
             return Value.cast(total.truncate(_SHIFTED)) >> shift
 
-        for row, name in enumerate("xy"):
+        for name, total in zip("xy", totals, strict=True):
             moved = g.register(
                 f"{name}_moved",
                 lambda v, s: FixedValue(p.SPACE, shifted(v, s)[_SHIFTED - places :][:bits]),
-                space(name, row),
+                total,
                 shift,
             )
             point = p.place.fraction_bits + p.GUARD

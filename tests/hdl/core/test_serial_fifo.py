@@ -59,9 +59,9 @@ def test_a_memory_without_a_read_in_a_cycle():
 
 
 def test_cycles():
-    """A payload of three parts comes every four cycles, takes five, and leaves every five."""
+    """A payload of three parts comes every four cycles, takes eight, and leaves every five."""
     run = simulate(Fifo(16), pairs(20), count=20, engine="pysim")
-    assert run.cycles[0] - run.input_cycles[0] == PARTS + 2
+    assert run.cycles[0] - run.input_cycles[0] == 2 * PARTS + 2
     assert np.diff(run.input_cycles).min() == PARTS + 1
     assert set(np.diff(run.cycles)) == {PARTS + 2}
 
