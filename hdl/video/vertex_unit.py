@@ -140,7 +140,7 @@ class VertexUnit(PipelinedUnit):
             )
         )
         index = g.input("index", lambda operands: operands.index)
-        places, bits = p.SPACE.fraction_bits, p.SPACE.width
+        places = p.SPACE.fraction_bits
         self._matrix = g.share("matrix", (unsigned((ENTRIES - 1).bit_length()),), 0, self._entries)
 
         # The rows come first, so that the products of a row come one after the other.
@@ -160,42 +160,10 @@ class VertexUnit(PipelinedUnit):
             for k in range(3)
         ]
         totals = [space(name, row) for row, name in enumerate("xy")]
-        code = g.wire("w_code", lambda w: Value.cast(w), w)
-        outside = g.register(
-            "beyond", lambda c: c[-1] | ~c[places:-1].any() | c[places + p.SHIFTS + 1 : -1].any(), code
-        )
-        shift = g.register(
-            "shift", lambda c: sum(c[places + k : places + p.SHIFTS + 1].any() for k in (1, 2, 3))[:2], code
-        )
-
-        def mantissa(c, shift, outside):
-            # The first bit is 1 for every vertex, because a vertex outside gets W = 1.
-            moved = (c >> Mux(outside, 0, shift))[:places]
-            return FixedValue(Reciprocal.FORMAT, Cat(Mux(outside, 0, moved), Const(1, 1)))
-
-        m = g.register("mantissa", mantissa, code, shift, outside)
-        shift = g.register("shift_inside", lambda shift, outside: Mux(outside, 0, shift), shift, outside)
-        table = shared_table(g, lambda: self._module)
-        r = reciprocal_word(g, table, "reciprocal", m)
+        outside, shift, r = self._reciprocal(w)
         words = {"index": index}
-
-        def shifted(total, shift):
-            # All words over W are in the same bits of the accumulator, so they share the shifter behind it.
-            return Value.cast(total.truncate(_SHIFTED)) >> shift
-
         for name, total in zip("xy", totals, strict=True):
-            moved = g.register(
-                f"{name}_moved",
-                lambda v, s: FixedValue(p.SPACE, shifted(v, s)[_SHIFTED - places :][:bits]),
-                total,
-                shift,
-            )
-            point = p.place.fraction_bits + p.GUARD
-            rounded = wide_product(
-                *(g, f"{name}_rounded", moved, r, p.X_LOW, p.RECIPROCAL_LOW, point),
-                lambda value: value.round_half_up(p.place.fraction_bits),
-                self._sums,
-            )
+            rounded = self._place(name, total, shift, r)
             words[name] = g.register(f"{name}_word", lambda value: value.saturate(p.place), rounded)
             words[f"{name}_over"] = g.register(f"{name}_over", self._over, rounded)
         words["outside"] = outside
@@ -213,7 +181,7 @@ class VertexUnit(PipelinedUnit):
             rounded = self._sums.sum(f"{name}_scaled", [scaled], _SUM, half(_SHIFTED))
             words[name] = g.register(
                 f"{name}_word",
-                lambda v, s: shifted(v, s)[_SHIFTED - ATTRIBUTE.fraction_bits :][: ATTRIBUTE.width],
+                lambda v, s: _shifted(v, s)[_SHIFTED - ATTRIBUTE.fraction_bits :][: ATTRIBUTE.width],
                 rounded,
                 shift,
             )
@@ -231,6 +199,44 @@ class VertexUnit(PipelinedUnit):
         product = g.multiply("weight_scaled", factor, factor, lambda _: weight)
         over_w(f"surface_{p.surface.attributes}", product)
         return words
+
+    def _reciprocal(self, w: Word) -> tuple[Word, Word, Word]:
+        """Whether W is outside, its shift, and the reciprocal of W after the shift."""
+        g, p = self._graph, self.model
+        places = p.SPACE.fraction_bits
+        code = g.wire("w_code", lambda w: Value.cast(w), w)
+        outside = g.register(
+            "beyond", lambda c: c[-1] | ~c[places:-1].any() | c[places + p.SHIFTS + 1 : -1].any(), code
+        )
+        shift = g.register(
+            "shift", lambda c: sum(c[places + k : places + p.SHIFTS + 1].any() for k in (1, 2, 3))[:2], code
+        )
+
+        def mantissa(c, shift, outside):
+            # The first bit is 1 for every vertex, because a vertex outside gets W = 1.
+            moved = (c >> Mux(outside, 0, shift))[:places]
+            return FixedValue(Reciprocal.FORMAT, Cat(Mux(outside, 0, moved), Const(1, 1)))
+
+        m = g.register("mantissa", mantissa, code, shift, outside)
+        shift = g.register("shift_inside", lambda shift, outside: Mux(outside, 0, shift), shift, outside)
+        table = shared_table(g, lambda: self._module)
+        return outside, shift, reciprocal_word(g, table, "reciprocal", m)
+
+    def _place(self, name: str, total: Word, shift: Word, r: Word) -> Word:
+        """A place on the screen before it saturates, from X or Y and the reciprocal of W."""
+        g, p = self._graph, self.model
+        bits, point = p.SPACE.width, p.place.fraction_bits + p.GUARD
+        moved = g.register(
+            f"{name}_moved",
+            lambda v, s: FixedValue(p.SPACE, _shifted(v, s)[_SHIFTED - p.SPACE.fraction_bits :][:bits]),
+            total,
+            shift,
+        )
+        return wide_product(
+            *(g, f"{name}_rounded", moved, r, p.X_LOW, p.RECIPROCAL_LOW, point),
+            lambda value: value.round_half_up(p.place.fraction_bits),
+            self._sums,
+        )
 
     def _over(self, rounded: FixedValue) -> Value:
         """Whether a coordinate saturates."""
@@ -265,6 +271,11 @@ class VertexUnit(PipelinedUnit):
             ),
         ]
         return result
+
+
+def _shifted(total: FixedValue, shift: Value) -> Value:
+    """A sum, shifted right. All sums are in the same bits of the accumulator, so they share the shifter."""
+    return Value.cast(total.truncate(_SHIFTED)) >> shift
 
 
 def _component(total: FixedValue) -> FixedValue:
