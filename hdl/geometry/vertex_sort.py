@@ -2,7 +2,7 @@
 
 from collections.abc import Sequence
 
-from amaranth.hdl import Cat, Module, Mux, Signal, Value, signed, unsigned
+from amaranth.hdl import Cat, Const, Module, Mux, Signal, Value, signed, unsigned
 from amaranth.lib import data, stream, wiring
 from amaranth.lib.memory import Memory
 from amaranth.lib.wiring import In, Out
@@ -130,7 +130,8 @@ class VertexSortUnit(wiring.Component):
         two_sided = self._stage(
             m, self._stage(m, given.two_sided, "two_sided_1", moves), "two_sided_2", moves
         )
-        total, last = self._total(m, there, [*columns[::2], *rows[::2]])
+        wide = self._stage(m, self._wide([v[b] - v[0] for v in (x, y) for b in (1, 2)]), "wide", moves)
+        total, last = self._total(m, (there, wide), [*columns[::2], *rows[::2]])
         m.d.comb += moves.eq(goes & (~there | last))
         there = self._valid(m, there & last, 3)
 
@@ -230,19 +231,24 @@ class VertexSortUnit(wiring.Component):
         begin, end = (self.constants[name] for name in ends)
         return (low, high), Cat(low < high, low < end, begin < high).all()
 
-    def _total(self, m: Module, there: Value, differences: list) -> tuple[Signal, Value]:
+    def _wide(self, differences: list) -> Value:
+        """Whether a difference needs its upper half, so that the products need four parts."""
+        if len(differences[0]) <= FACTOR_BITS:
+            return Const(0, 1)
+        ends = [value[FACTOR_BITS - 1 :] for value in differences]
+        return Cat(end.any() & ~end.all() for end in ends).any()
+
+    def _total(self, m: Module, kind: tuple, differences: list) -> tuple[Signal, Value]:
         """``a`` of stage 6 from differences of stage 2, and whether the triangle leaves stage 2.
 
-        Let h and l be the upper and the lower half of a difference, ``h 2^17 + l``. The four parts of a wide
-        product are ``h h'``, ``h l'``, ``l h'`` and ``l l'``.
+        ``kind`` tells whether a triangle is in stage 2, and whether it is wide (`_wide`). Let h and l be the
+        upper and the lower half of a difference, ``h 2^17 + l``. The four parts of a wide product are
+        ``h h'``, ``h l'``, ``l h'`` and ``l l'``.
         """
         half, bits = FACTOR_BITS - 1, 2 * self.grid.bits + 1
-        part, wide = Signal(2, name="part"), Signal(name="wide")
-        if len(differences[0]) > FACTOR_BITS:
-            ends = [value[half:] for value in differences]
-            m.d.comb += wide.eq(Cat(end.any() & ~end.all() for end in ends).any())
-            with m.If(there & wide & self._goes):
-                m.d.sync += part.eq(part + 1)
+        part, (there, wide) = Signal(2, name="part"), kind
+        with m.If(there & wide & self._goes):
+            m.d.sync += part.eq(part + 1)
 
         def factor(value, upper, name):
             if len(value) <= FACTOR_BITS:
