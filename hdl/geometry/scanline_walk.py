@@ -129,7 +129,7 @@ class ScanlineWalk:
         self.turns = turns
         self.emits, self.gives, self.cuts = (Signal(name=name) for name in ("emits", "gives", "cuts"))
         self.skipping, whole = Signal(name="skipping"), Signal(name="whole")
-        self.moves, self.ends = (Signal(name=name) for name in ("moves", "ends"))
+        self.moves, self.ends = Signal(name="moves"), Signal(name="ends", init=not turns.serial)
         radix = 2 if turns.serial else 1
         self.digit = Signal(radix, name="digit")
         self.single, self.double = Signal(name="single"), Signal(name="double") if turns.serial else Const(0)
@@ -183,12 +183,10 @@ class ScanlineWalk:
                         ),
                     ]
         else:
-            loaded_piece = _piece(count[:PIXEL_BITS], loaded_mask)
-            next_piece = _piece(Mux(self.skipping, left, after), mask)
-            m.d.comb += [
-                self.ends.eq(~bits[radix:].any()),
-                turns.leaves.eq(self.ends & ~self.skipping & ~whole),
-            ]
+            following = Mux(self.skipping, left, after)
+            loaded_piece, next_piece = _piece(count[:PIXEL_BITS], loaded_mask), _piece(following, mask)
+            m.d.comb += turns.leaves.eq(self.ends & ~self.skipping & ~whole)
+            self._tell_ends(m, row, (loaded_mask, mask), bits, following)
         first = Signal(name="first_piece")
         m.d.comb += self.cuts.eq(turns.goes & busy & self.ends & ~self.skipping & whole & first)
         with m.If(turns.goes):
@@ -218,6 +216,23 @@ class ScanlineWalk:
         with m.If(turns.goes & (turns.loads | slides)):
             m.d.sync += begin.eq(Mux(turns.loads, row.x, begin + self.pixels + 1))
         self.x = Mux(tag.right, begin + left - self.pixels, begin)[:PIXEL_BITS]
+
+    def _tell_ends(self, m: Module, row, masks: tuple, bits: Signal, following: Value) -> None:
+        """Drive ``ends`` a cycle ahead: whether the bits that are walked are the last bits of their number.
+
+        A number has more bits if it is over 1. The number of a piece is over 1 if the mask is, and over two
+        pixels are left.
+        """
+        (loaded_mask, mask), turns, radix = masks, self.turns, len(self.digit)
+        over_two = row.length[2:].any() | row.length[:2].all()
+        with m.If(turns.goes):
+            with m.If(turns.loads):
+                more = Mux(row.skips, row.skip[radix:].any(), loaded_mask[1] & over_two)
+                m.d.sync += self.ends.eq(~more)
+            with m.Elif(~self.ends):
+                m.d.sync += self.ends.eq(~bits[2 * radix :].any())
+            with m.Else():
+                m.d.sync += self.ends.eq(~(mask[1] & following[radix:].any()))
 
     def values(
         self, m: Module, name: str, loads, base, inward, following_step, cuts: bool
