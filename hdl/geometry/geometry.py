@@ -75,6 +75,10 @@ The counters wrap. Their difference is right, because fewer than 2^10 triangles 
 """
 
 
+_ADDED = "sliver", "empty"
+"""Counters of several units, or of several lanes."""
+
+
 class _TriangleSetup(wiring.Component):
     """A lane of `GeometryUnit`. From sorted triangles it makes planes, and edges for the walk.
 
@@ -408,15 +412,25 @@ class GeometryUnit(wiring.Component):
             made, idle = self._halver, idle & self._halver.idle
         if made is not self._normals:
             idle &= ~moving(m, "pieces", made.o, self.o)
+        idle &= ~self._changes.any()
         m.d.comb += self.idle.eq(((taken - walked)[:_INSIDE_BITS] == dropped) & idle)
 
     def _count(self, m: Module) -> None:
-        """Counters of the units. If two units have the same counter, the counters are added."""
-        sliver = Signal(unsigned(len(self.status.sliver)), name="slivers")
-        m.d.sync += sliver.eq(sliver + sum(lane.sliver for lane in self._lanes))
+        """Counters of the units. A counter that two units have is counted again from their lowest bits.
+
+        So only this bit of a unit's counter takes cells, unless the other bits are used elsewhere.
+        """
+        sliver, empty = (Signal(unsigned(len(self.status[name])), name=f"{name}s") for name in _ADDED)
         sort, attributes = self._sort.status, self._attributes.status
+        lowest, before = Cat(sort.empty[0], attributes.empty[0]), Signal(2, name="counted")
+        self._changes = lowest ^ before
+        m.d.sync += [
+            before.eq(lowest),
+            sliver.eq(sliver + sum(lane.sliver for lane in self._lanes)),
+            empty.eq(empty + sum(self._changes)),
+        ]
         m.d.comb += [
-            self.status.empty.eq(sort.empty + attributes.empty),
+            self.status.empty.eq(empty),
             self.status.zero_area.eq(sort.zero_area),
             self.status.culled.eq(sort.culled),
             self.status.sliver.eq(sliver),
