@@ -202,7 +202,7 @@ class GeometryUnit(wiring.Component):
       number of pixels. A span never takes more cycles than it has pixels. If n pixels are cut off at the long
       edge, the scanline takes one more cycle for each bit of n. In the compact style a scanline takes a cycle
       for each attribute, four without a surface, and as many more for every two of these bits. At the same
-      time the normals take three cycles each. With ``vectors`` a span takes two more cycles for each piece
+      time the normals take three cycles each. With ``vectors`` a span takes three more cycles for each piece
       behind the first, and each time that a piece does not fit (`SpanHalverUnit`). In the compact style a
       piece takes 13 cycles or more at the same time, and with a surface 3 more for each of its attributes
       (`SerialVectorsUnit`).

@@ -24,6 +24,12 @@ __all__ = ["SpanHalverUnit", "halved_spans_shape", "is_apart", "is_kept", "short
 
 _COMPONENTS = ATTRIBUTES - 1
 
+_SIZES = data.ArrayLayout(data.ArrayLayout(unsigned(SpanHalver.BITS + 1), _COMPONENTS), 2)
+
+_MARKS = data.StructLayout({"shift": 2, "used": 1, "sizes": _SIZES, "same": _COMPONENTS, "few": 3})
+"""Marks of a piece: which of the shifts by 4 and by 2 its sizes had, whether they use their first bit, the
+sizes at both ends, whether components keep their signs, and the pixels (`_few`)."""
+
 
 def halved_spans_shape(surface: AttributeSpans | None = None) -> data.StructLayout:
     """Shape of a piece: N/W at its first pixel, its step and shift, depth, first pixel, length, flags.
@@ -44,10 +50,11 @@ def halved_spans_shape(surface: AttributeSpans | None = None) -> data.StructLayo
 class SpanHalverUnit(wiring.Component):
     """Pieces of spans along which N/W stays long. `SpanHalver` is the bit-accurate model.
 
-    A span, or a piece, is offered on the cycle after it was taken in. While the output is ready, a span is
-    taken in on every cycle. A span that does not fit takes two cycles more each time that it is tried again.
-    The rest of a span behind a piece takes two cycles more, too. Both ends of an attribute share one adder.
-    The unit has no multipliers.
+    A span waits for a cycle, on which the unit tests it. On the next cycle the span is offered, if it fits.
+    ``i.ready`` is a register, so no path leads from the output to the walk along spans. While the output is
+    ready, two spans are taken in every three cycles. A span that does not fit takes three cycles more each
+    time that it is tried again. The rest of a span behind a piece takes three cycles more, too. Both ends of
+    an attribute share one adder. The unit has no multipliers.
 
     Parameters
     ----------
@@ -74,7 +81,7 @@ class SpanHalverUnit(wiring.Component):
     Source: docs/theory/geometry.md#normals; not in the documents.
     """
 
-    latency = 1
+    latency = 2
 
     def __init__(self, model: SpanHalver | None = None, surface: AttributeSpans | None = None):
         self.model, self._surface = model or SpanHalver(), surface
@@ -88,53 +95,76 @@ class SpanHalverUnit(wiring.Component):
         self.idle = Signal(name="idle")
 
     def elaborate(self, platform):
-        """The piece that is tried, the bits that tell whether it fits, and the next try."""
+        """A span that waits for its test, the piece that is tried, and the next try."""
         m = Module()
         given, result = self.i.payload, self.o.payload
-        # ``known``: the bits of the test belong to the piece's ends; ``whole``: the piece reaches to the end
-        # of the span.
-        valid, known, whole, uncut = (Signal(name=name) for name in ("valid", "known", "whole", "uncut"))
-        fits, takes, leaves = (Signal(name=name) for name in ("fits", "takes", "leaves"))
+        # ``waits``: a span waits for its test. ``valid``: a piece is inside. ``fits`` and ``misses`` tell the
+        # result of its test. ``again`` and ``tried``: the marks, then the test of another piece are due.
+        # ``whole``: the piece reaches to the end of the span.
+        waits, valid, fits, misses, again, tried, whole, uncut = (
+            Signal(name=name)
+            for name in ("waits", "valid", "fits", "misses", "again", "tried", "whole", "uncut")
+        )
+        takes, moves, leaves, stays, retries, fitting = (
+            Signal(name=name) for name in ("takes", "moves", "leaves", "stays", "retries", "fitting")
+        )
+        ready = Signal(name="ready", init=1)
+        waiting = Signal(given.shape(), name="waiting", reset_less=True)
         tag = {
             name: Signal.like(Value.cast(given[name]), name=name, reset_less=True)
             for name in ("y", "right", "flip", "material", *placement_of(self._surface))
         }
         x, left, pixels = (Signal(PIXEL_BITS, name=name, reset_less=True) for name in ("x", "left", "pixels"))
         m.d.comb += [
-            self.o.valid.eq(valid & known & fits),
-            leaves.eq(self.o.valid & self.o.ready),
-            self.i.ready.eq(~valid | (leaves & whole)),
-            takes.eq(self.i.valid & self.i.ready),
-            self.idle.eq(~valid),
+            self.o.valid.eq(fits),
+            self.i.ready.eq(ready),
+            takes.eq(self.i.valid & ready),
+            leaves.eq(fits & self.o.ready),
+            stays.eq(valid & ~(leaves & whole)),
+            moves.eq(waits & ~stays),
+            retries.eq((leaves & ~whole) | misses),
+            self.idle.eq(~(waits | valid)),
         ]
-        retries, rest = Signal(name="retries"), (left - pixels)[:PIXEL_BITS]
-        odd = pixels[0]
-        m.d.comb += retries.eq(valid & known & ~fits)
-        count, moves = attribute_count(self._surface), (takes, leaves, retries)
-        ends = [self._attribute(m, k, moves, (fits, odd), given) for k in range(count)]
-        marks = self._marks(m, valid & ~known, takes, ends, given)
-        m.d.comb += fits.eq(self._fits(marks, pixels))
-
+        # A span may come if no span waits then, or if the span that waits moves on, because no piece is
+        # inside. The marks of another piece take the place of the marks of a span at the input.
+        m.d.sync += [
+            waits.eq(takes | (waits & stays)),
+            ready.eq(~retries & ~((takes | stays) & waits) & ~(takes & stays)),
+            again.eq(retries),
+            tried.eq(again),
+        ]
         with m.If(takes):
+            m.d.sync += waiting.eq(given)
+        rest, odd = (left - pixels)[:PIXEL_BITS], pixels[0]
+        count, kinds = attribute_count(self._surface), (moves, leaves, misses)
+        ends = [self._attribute(m, k, kinds, odd, waiting) for k in range(count)]
+        marks = self._tested_marks(m, (again, tried), takes, ends, (given, pixels))
+        shift = Signal(len(result.shift), name="shift", reset_less=True)
+        m.d.comb += fitting.eq(self._fits(m, marks))
+        m.d.sync += [
+            fits.eq(Mux(moves | tried, fitting, fits & ~leaves)),
+            misses.eq((moves | tried) & ~fitting),
+        ]
+        with m.If(moves | tried):
+            m.d.sync += shift.eq(Cat(marks.used, marks.shift))
+
+        with m.If(moves):
             m.d.sync += [
-                *(signal.eq(Value.cast(given[name])) for name, signal in tag.items()),
-                *(signal.eq(given.length) for signal in (left, pixels)),
-                x.eq(given.x),
-                *(flag.eq(1) for flag in (valid, known, whole, uncut)),
+                *(signal.eq(Value.cast(waiting[name])) for name, signal in tag.items()),
+                *(signal.eq(waiting.length) for signal in (left, pixels)),
+                x.eq(waiting.x),
+                *(flag.eq(1) for flag in (valid, whole, uncut)),
             ]
         with m.Elif(leaves):
             m.d.sync += [
                 valid.eq(~whole),
-                known.eq(0),
                 whole.eq(1),
                 left.eq(rest),
                 pixels.eq(rest),
                 x.eq(Mux(tag["right"], x, x + pixels)),
             ]
-        with m.Elif(retries):
-            m.d.sync += [known.eq(0), whole.eq(0), uncut.eq(0), pixels.eq(shorter(pixels))]
-        with m.Else():
-            m.d.sync += known.eq(1)
+        with m.Elif(misses):
+            m.d.sync += [whole.eq(0), uncut.eq(0), pixels.eq(shorter(pixels))]
 
         turned = tag["right"]
         steps = []
@@ -154,19 +184,19 @@ class SpanHalverUnit(wiring.Component):
                 steps.append(Mux(turned, -step, step)[: len(step)])
         m.d.comb += [
             Value.cast(result.depth_step).eq(steps[0]),
-            result.shift.eq(marks["shift"]),
+            result.shift.eq(Cat(~shift[0], shift[1:])),
             result.x.eq(Mux(turned, x + rest, x)),
             result.length.eq(pixels),
             result.turned.eq(turned),
             *(Value.cast(result[name]).eq(word) for name, word in tag.items() if name != "right"),
         ]
-        count_events(m, self.status, cut=retries & uncut)
+        count_events(m, self.status, cut=misses & uncut)
         return m
 
     @staticmethod
-    def _attribute(m: Module, k: int, moves, kind, given) -> tuple[Signal, Signal, Signal]:
+    def _attribute(m: Module, k: int, kinds, odd, waiting) -> tuple[Signal, Signal, Signal]:
         """Registers of an attribute at both ends of the piece, and of its step."""
-        (takes, leaves, retries), (fits, odd) = moves, kind
+        moves, leaves, misses = kinds
         near, far, last, step = (
             Signal(SPAN_STEP.width, name=f"{name}_{k}", reset_less=True)
             for name in ("near", "far", "last", "step")
@@ -174,87 +204,100 @@ class SpanHalverUnit(wiring.Component):
         signed_far, signed_near = far.as_signed(), near.as_signed()
         # After a piece the next pixel follows. After a try that does not fit, the end moves to one pixel
         # less, or to the mean of both ends.
-        other = Mux(fits, step.as_signed(), Mux(odd, signed_near, ~step.as_signed()))
+        other = Mux(misses, Mux(odd, signed_near, ~step.as_signed()), step.as_signed())
         total = Signal(SPAN_STEP.width + 1, name=f"total_{k}")
-        m.d.comb += total.eq(signed_far + other + (~fits & ~odd))
-        with m.If(takes):
+        m.d.comb += total.eq(signed_far + other + (misses & ~odd))
+        with m.If(moves):
             m.d.sync += [
-                near.eq(Value.cast(given.near[k])),
-                *(signal.eq(Value.cast(given.far[k])) for signal in (far, last)),
-                step.eq(Value.cast(given.inward[k])),
+                near.eq(Value.cast(waiting.near[k])),
+                *(signal.eq(Value.cast(waiting.far[k])) for signal in (far, last)),
+                step.eq(Value.cast(waiting.inward[k])),
             ]
         with m.Elif(leaves):
             m.d.sync += [near.eq(total), far.eq(last)]
-        with m.Elif(retries):
+        with m.Elif(misses):
             m.d.sync += far.eq(Mux(odd, total >> 1, total))
         return near, far, step
 
+    def _tested_marks(self, m: Module, due, takes, ends, words) -> data.View:
+        """Marks of the span or piece that is tested, from registers."""
+        (again, tried), (given, pixels) = due, words
+        found = self._marks(m, again, ends, given)
+        first, later, chosen = (
+            Signal(_MARKS, name=name, reset_less=True) for name in ("first", "later", "chosen")
+        )
+        with m.If(takes):
+            m.d.sync += [first.eq(found), first.few.eq(_few(given.length))]
+        with m.If(again):
+            m.d.sync += [later.eq(found), later.few.eq(_few(pixels))]
+        m.d.comb += chosen.eq(Mux(tried, later, first))
+        return chosen
+
     @staticmethod
-    def _marks(m: Module, again, takes, ends, given) -> dict:
-        """Registers: the shift, the first bits of the sizes, whether signs are the same."""
-        bits, places = SpanHalver.BITS, SpanHalver.LARGEST_SHIFT
-
-        # Each stage is a signal, because an expression that is used twice would be built twice.
-        def wire(value, name):
-            signal = Signal(Value.cast(value).shape(), name=name)
-            m.d.comb += signal.eq(value)
-            return signal
-
+    def _marks(m: Module, again, ends, given) -> data.View:
+        """Marks of a piece or of the span at the input, without the pixels."""
+        bits = SpanHalver.BITS
         sizes, signs = [], []
         for k in range(_COMPONENTS):
             for end, (held, incoming) in enumerate(
                 zip(ends[k][:2], (given.near[k], given.far[k]), strict=True)
             ):
-                code = wire(Mux(again, held, Value.cast(incoming).as_unsigned()), f"end_{end}_{k}")
-                sizes.append(wire(size_of(code), f"whole_size_{end}_{k}"))
+                code = _wire(m, Mux(again, held, Value.cast(incoming).as_unsigned()), f"end_{end}_{k}")
+                sizes.append(_wire(m, size_of(code), f"whole_size_{end}_{k}"))
                 signs.append(code[-1])
         used = sizes[0][bits:]
         for size in sizes[1:]:
             used = used | size[bits:]
-        used = wire(used, "used")
-        shift = []
-        for step in (4, 2, 1):
-            empty = wire(~used[-step:].any(), f"empty_{step}")
-            used = wire(Mux(empty, used << step, used)[:places], f"used_{step}")
-            sizes = [
-                wire(Mux(empty, size << step, size)[: places + bits], f"size_{step}_{k}")
-                for k, size in enumerate(sizes)
-            ]
-            shift.insert(0, empty)
-        marks = {
-            "shift": Signal(len(shift), name="shift", reset_less=True),
-            "sizes": [
-                [Signal(bits, name=f"size_{end}_{k}", reset_less=True) for k in range(_COMPONENTS)]
-                for end in range(2)
-            ],
-            "same": [Signal(name=f"same_{k}", reset_less=True) for k in range(_COMPONENTS)],
-        }
-        with m.If(again | takes):
-            m.d.sync += marks["shift"].eq(Cat(shift))
-            for k in range(_COMPONENTS):
-                m.d.sync += [
-                    marks["same"][k].eq(signs[2 * k] == signs[2 * k + 1]),
-                    *(marks["sizes"][end][k].eq(sizes[2 * k + end][-bits:]) for end in range(2)),
-                ]
+        used, marks = _wire(m, used, "used"), Signal(_MARKS, name="marks")
+        for number, step in enumerate((4, 2)):
+            empty = _wire(m, ~used[-step:].any(), f"empty_{step}")
+            used, *sizes = (
+                _wire(m, Mux(empty, word << step, word)[: len(word)], f"shifted_{step}_{k}")
+                for k, word in enumerate((used, *sizes))
+            )
+            m.d.comb += marks.shift[1 - number].eq(empty)
+        m.d.comb += [
+            marks.used.eq(used[-1]),
+            marks.same.eq(Cat(first == last for first, last in zip(signs[::2], signs[1::2], strict=True))),
+            *(marks.sizes[k % 2][k // 2].eq(size[-bits - 1 :]) for k, size in enumerate(sizes)),
+        ]
         return marks
 
-    def _fits(self, marks: dict, pixels: Value) -> Value:
+    def _fits(self, m: Module, marks: data.View) -> Value:
         """Whether the piece needs no cut."""
-        scale = 1 << SpanHalver.BITS
+        bits, scale = SpanHalver.BITS, 1 << SpanHalver.BITS
         axis, pair = int(SpanHalver.AXIS * scale), int(SpanHalver.PAIR * scale)
-        first, last = marks["sizes"]
-        same = marks["same"]
+        first, last = (
+            [
+                _wire(m, Mux(marks.used, size[1:], size[:-1]), f"size_{end}_{k}")
+                for k, size in enumerate(marks.sizes[end][k] for k in range(_COMPONENTS))
+            ]
+            for end in range(2)
+        )
+        same = [marks.same[k] for k in range(_COMPONENTS)]
         long = 0
         for k, keeps in enumerate(same):
             long = long | (keeps & (first[k] >= axis) & (last[k] >= axis))
             j = (k + 1) % len(same)
             sums = [end[j] + end[k] >= pair for end in (first, last)]
             long = long | (keeps & same[j] & sums[0] & sums[1])
-        large = [first[k][-1] | last[k][-1] for k in range(len(same))]
+        large = [a[bits - 1] | b[bits - 1] for a, b in zip(first, last, strict=True)]
         steep = Cat(~keeps & size for keeps, size in zip(same, large, strict=True)).any()
         if self.model.rotates:
             steep = Cat(is_apart(*words) for words in zip(same, first, last, strict=True)).any()
-        return is_kept(pixels, long, Cat(large).any(), steep)
+        return is_kept(marks.few, long, Cat(large).any(), steep)
+
+
+def _wire(m: Module, value: Value, name: str) -> Signal:
+    """A signal with a value. An expression that is used twice would be built twice."""
+    signal = Signal(Value.cast(value).shape(), name=name)
+    m.d.comb += signal.eq(value)
+    return signal
+
+
+def _few(pixels: Value) -> Value:
+    """Three bits of a number of pixels, from which `is_kept` knows 1 and 2."""
+    return Cat(pixels[:2], pixels[2:].any())
 
 
 def size_of(code: Value) -> Value:
