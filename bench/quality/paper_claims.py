@@ -127,9 +127,9 @@ REPEATED: Mapping[str, tuple[str, str]] = {
     "a triangle takes 8 or 4 cycles": ("theory/geometry.md", "A triangle then takes 8 or 4 cycles"),
     "its tests have to find at least 95 %": ("guide/checked.md", "must find at least 95 % of the others"),
     "k#sub[a] 0.05, k#sub[d] 0.4 and k#sub[s] 0.55": ("guide/accuracy.md", "k_a 0.05, k_d 0.4, k_s 0.55"),
-    "Seeds of one design differ by up to 26 MHz": (
+    "Seeds of one design differ by up to 49 MHz": (
         "guide/rivals.md",
-        "The seeds of a design differ by up to 26 MHz",
+        "The seeds of a design differ by up to 49 MHz",
     ),
     "the largest of eight searches": ("guide/accuracy.md", "the largest of seeds 1 to 8"),
     "With normals and cosines of 12 bits, and all else exact, it is up to 6.84 LSB off": (
