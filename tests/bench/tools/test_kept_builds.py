@@ -92,7 +92,7 @@ def test_an_interrupted_build_goes_on(folder, monkeypatch):
     def run(self, name, code, arguments, folder, text="", watch=None):
         called.append(name)
         if name == "Yosys":
-            (folder / "netlist.json").write_text('{"modules": {"top": {"cells": {}}}}')
+            (folder / "netlist.json").write_text('{"modules": {"top": {"cells": {}, "ports": {}}}}')
         elif name == "ecppack" and interrupts:
             raise interrupts.pop()
         elif name == "nextpnr" and arguments[arguments.index("--seed") + 1] == "1":
