@@ -175,7 +175,7 @@ class _TriangleSetup(wiring.Component):
 
 
 class GeometryUnit(wiring.Component):
-    """Triangles to spans, a triangle in 4, 8 or 16 cycles and a span a cycle. `Geometry` is the model.
+    """Triangles to spans, a triangle in 4, 8 or 16 cycles and up to a span a cycle. `Geometry` is the model.
 
     The unit has the units of this package in a row. The corners of a sorted triangle go to the edge setup.
     They also go to a FIFO, one attribute after the other. There the attributes wait for the scales of their
@@ -199,12 +199,14 @@ class GeometryUnit(wiring.Component):
       in the compact style. In the throughput style a triangle takes one more cycle there;
     - for a span or piece of p pixels as many cycles as ``p - 1`` has bits. The least is 1 cycle for 1 pixel,
       2 cycles for 2 pixels and 3 cycles for more. With ``lines`` or ``vectors`` the least is 1 cycle for any
-      number of pixels. A span never takes more cycles than it has pixels. If n pixels are cut off at the long
-      edge, the scanline takes one more cycle for each bit of n. In the compact style a scanline takes a cycle
-      for each attribute, four without a surface, and as many more for every two of these bits. At the same
-      time the normals take three cycles each. With ``vectors`` a span takes three more cycles for each piece
-      behind the first, and each time that a piece does not fit (`SpanHalverUnit`). In the compact style a
-      piece takes 13 cycles or more at the same time, and with a surface 3 more for each of its attributes
+      number of pixels. So a span takes no more cycles than it has pixels. Only with ``vectors`` spans of one
+      pixel take up to 1.5 cycles each, because the halver takes two spans in three cycles. If n pixels are
+      cut off at the long edge, the scanline takes one more cycle for each bit of n. In the compact style a
+      scanline takes a cycle for each attribute, four without a surface, and as many more for every two of
+      these bits. At the same time the normals take three cycles each. With ``vectors`` a span takes three
+      more cycles for each piece behind the first, and each time that a piece does not fit (`SpanHalverUnit`).
+      In the compact style a piece takes 13 cycles or more at the same time, and with a surface 3 more for
+      each of its attributes
       (`SerialVectorsUnit`).
 
     The number of multipliers is `multipliers`: 16, or 5 in the compact style. With ``lines`` or ``vectors``

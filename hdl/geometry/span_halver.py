@@ -323,7 +323,7 @@ def is_kept(pixels: Value, long: Value, large: Value, steep: Value) -> Value:
     Parameters
     ----------
     pixels : Value
-        Number of the piece's pixels.
+        Number of the piece's pixels, or its three bits by `_few`.
     long : Value
         Whether a component, or a sum of two, stays long along the piece.
     large : Value
