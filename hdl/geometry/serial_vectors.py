@@ -16,7 +16,7 @@ from blysk.hdl.core.bits import select
 from blysk.hdl.core.ring import Ring, next_turn
 from blysk.hdl.core.views import copy, copy_fields
 from blysk.hdl.geometry.span_attributes import whole_span_shape
-from blysk.hdl.geometry.span_halver import is_apart, is_kept, shorter, size_of
+from blysk.hdl.geometry.span_halver import few_of, is_apart, is_kept, shorter, size_of
 from blysk.hdl.geometry.surface_words import (
     STEP_BITS,
     attribute_count,
@@ -107,11 +107,13 @@ class SerialVectorsUnit(wiring.Component):
         # While ``leaving`` is high, a piece has not left yet. The words of the next piece have to wait.
         leaving = Signal(name="leaving")
         comes = loads | (steps & Mux(begins, whole & self.i.valid, overlaps))
+        # The last turn of a step waits for nothing but the input. So its path is short.
+        comes_last = loads | (steps & overlaps)
         m.d.comb += [
             decides.eq(tests & begins),
             retries.eq(decides & ~fits),
             turns.eq(~settles & ~retries & ~(starts & begins & leaving) & (~comes | self.i.valid)),
-            ends.eq(turns & self._is_last(place)),
+            ends.eq(self._is_last(place) & (~comes_last | self.i.valid)),
             self.i.ready.eq(loads | (steps & Mux(begins, whole, overlaps))),
         ]
         with m.If(turns):
@@ -120,8 +122,8 @@ class SerialVectorsUnit(wiring.Component):
         rest_goes = steps & ~whole
         with m.If(ends | settles | retries):
             m.d.sync += [
-                loads.eq(steps & whole & ~comes),
-                settles.eq(ends & (comes | renews | repeats | rest_goes)),
+                loads.eq(steps & whole & ~comes_last),
+                settles.eq(ends & (comes_last | renews | repeats | rest_goes)),
                 repeats.eq(settles & ~agrees),
                 tests.eq(settles & agrees),
                 starts.eq(tests & ~retries),
@@ -131,8 +133,8 @@ class SerialVectorsUnit(wiring.Component):
 
         # The ends of a piece, or of the rest of a span, follow from the ends before.
         odd, renewed = Signal(name="odd"), renews | rest_goes
-        heads = self._rings(m, (turns, place), comes, renewed, odd, steps)
-        tag, pixels, uncut, words = self._pixels(m, comes & ends, retries, steps & ends, (whole, odd))
+        heads = self._rings(m, (turns, place), comes, renewed, odd, renews)
+        tag, pixels, uncut, words = self._pixels(m, comes_last & ends, retries, steps & ends, (whole, odd))
         kinds = turns & (comes | renewed | repeats), settles
         shift = self._test(m, heads, kinds, place, pixels, (fits, agrees))
         kinds = tests, starts & turns, steps, turns
@@ -158,7 +160,7 @@ class SerialVectorsUnit(wiring.Component):
     def _is_component(self, place: Signal):
         return ~place.all() if self._surface is None else place < ATTRIBUTES - 1
 
-    def _rings(self, m: Module, turns, comes, renews, odd, leaves) -> dict[str, Signal]:
+    def _rings(self, m: Module, turns, comes, renewed, odd, renews) -> dict[str, Signal]:
         """Rings of the near, far and last ends and of the steps. Returns their first words.
 
         The last end is the far end of the whole span.
@@ -168,13 +170,13 @@ class SerialVectorsUnit(wiring.Component):
         near, far, last, step = (rings[name].first for name in names)
         # After a piece the next pixel follows. After a try that does not fit, the end moves to one pixel
         # less, or to the mean of both ends.
-        other = Mux(leaves, step, Mux(odd, near, ~step))
+        other = Mux(renews, Mux(odd, near, ~step), step)
         total = Signal(_WIDTH + 1, name="total")
-        m.d.comb += total.eq(far.as_signed() + other.as_signed() + (~leaves & ~odd))
-        new_far = Mux(leaves, last, Mux(odd, total[1:], total[:_WIDTH]))
+        m.d.comb += total.eq(far.as_signed() + other.as_signed() + (renews & ~odd))
+        new_far = Mux(renews, Mux(odd, total[1:], total[:_WIDTH]), last)
         following = {
-            "near": (given.near, Mux(renews & leaves, total[:_WIDTH], near)),
-            "far": (given.far, Mux(renews, new_far, far)),
+            "near": (given.near, Mux(renewed & ~renews, total[:_WIDTH], near)),
+            "far": (given.far, Mux(renewed, new_far, far)),
             "last": (given.far, last),
             "step": (given.inward, step),
         }
@@ -269,7 +271,9 @@ class SerialVectorsUnit(wiring.Component):
             ]
             with m.If(begins):
                 m.d.sync += copy(zeroth, size)
-        m.d.comb += fits.eq(is_kept(pixels, long, large, steep))
+        few = Signal(3, name="few")
+        m.d.sync += few.eq(few_of(pixels))
+        m.d.comb += fits.eq(is_kept(few, long, large, steep))
         return shift
 
     def _words(self, m: Module, heads, kinds, place, shift, tag, words) -> None:

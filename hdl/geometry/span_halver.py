@@ -20,7 +20,7 @@ from blysk.hdl.geometry.surface_words import (
 )
 from blysk.hdl.geometry.triangles import count_events, counters_shape
 
-__all__ = ["SpanHalverUnit", "halved_spans_shape", "is_apart", "is_kept", "shorter", "size_of"]
+__all__ = ["SpanHalverUnit", "few_of", "halved_spans_shape", "is_apart", "is_kept", "shorter", "size_of"]
 
 _COMPONENTS = ATTRIBUTES - 1
 
@@ -28,7 +28,7 @@ _SIZES = data.ArrayLayout(data.ArrayLayout(unsigned(SpanHalver.BITS + 1), _COMPO
 
 _MARKS = data.StructLayout({"shift": 2, "used": 1, "sizes": _SIZES, "same": _COMPONENTS, "few": 3})
 """Marks of a piece: which of the shifts by 4 and by 2 its sizes had, whether they use their first bit, the
-sizes at both ends, whether components keep their signs, and the pixels (`_few`)."""
+sizes at both ends, whether components keep their signs, and the pixels (`few_of`)."""
 
 
 def halved_spans_shape(surface: AttributeSpans | None = None) -> data.StructLayout:
@@ -227,9 +227,9 @@ class SpanHalverUnit(wiring.Component):
             Signal(_MARKS, name=name, reset_less=True) for name in ("first", "later", "chosen")
         )
         with m.If(takes):
-            m.d.sync += [first.eq(found), first.few.eq(_few(given.length))]
+            m.d.sync += [first.eq(found), first.few.eq(few_of(given.length))]
         with m.If(again):
-            m.d.sync += [later.eq(found), later.few.eq(_few(pixels))]
+            m.d.sync += [later.eq(found), later.few.eq(few_of(pixels))]
         m.d.comb += chosen.eq(Mux(tried, later, first))
         return chosen
 
@@ -295,7 +295,7 @@ def _wire(m: Module, value: Value, name: str) -> Signal:
     return signal
 
 
-def _few(pixels: Value) -> Value:
+def few_of(pixels: Value) -> Value:
     """Three bits of a number of pixels, from which `is_kept` knows 1 and 2."""
     return Cat(pixels[:2], pixels[2:].any())
 
@@ -317,13 +317,13 @@ def shorter(pixels: Value) -> Value:
     return (Mux(odd, pixels >> 1, pixels) + Mux(odd, 1, (1 << PIXEL_BITS) - 1))[:PIXEL_BITS]
 
 
-def is_kept(pixels: Value, long: Value, large: Value, steep: Value) -> Value:
+def is_kept(few: Value, long: Value, large: Value, steep: Value) -> Value:
     """Whether a piece needs no cut.
 
     Parameters
     ----------
-    pixels : Value
-        Number of the piece's pixels, or its three bits by `_few`.
+    few : Value
+        What `few_of` gives for the number of the piece's pixels.
     long : Value
         Whether a component, or a sum of two, stays long along the piece.
     large : Value
@@ -332,7 +332,7 @@ def is_kept(pixels: Value, long: Value, large: Value, steep: Value) -> Value:
     steep : Value
         Whether a component's ends are too far apart for a piece of two pixels.
     """
-    two, one = (~pixels[2:].any() & (pixels[:2] == number) for number in (2, 1))
+    two, one = (~few[2] & (few[:2] == number) for number in (2, 1))
     return one | ((long | ~large) & ~(two & steep))
 
 
