@@ -10,6 +10,10 @@ import numpy as np
 import pytest
 from PIL import Image
 
+from blysk.bench.tools.board_design import gpu_of
+from blysk.bench.tools.boards import BOARDS
+from blysk.golden.albedo.attribute_spans import AttributeSpans
+
 EXAMPLES = Path(__file__).parents[1] / "examples"
 
 
@@ -25,6 +29,14 @@ def test_script(tmp_path):
     with Image.open(tmp_path / "teapot.png") as picture:
         assert picture.size == (320, 240)
     assert "\nmodule teapot_core (" in (tmp_path / "core.v").read_text()
+
+
+def test_colours(tmp_path):
+    """The mesh fits a board with a 25F, and its colours are drawn there."""
+    subprocess.run([sys.executable, EXAMPLES / "colours.py", tmp_path], capture_output=True, check=True)
+    gpu, _ = gpu_of(BOARDS["ulx3s-25f"], str(tmp_path / "colours.ply"), {})
+    assert gpu.drawing.mesh.surface == AttributeSpans()
+    assert gpu.drawing.lines == 8
 
 
 @pytest.mark.ci

@@ -72,11 +72,6 @@ _MOST_FRAMES = 60
     help="Add a loader, which takes other meshes of blysk send: from the serial port, from the flash after "
     "power-up, or both.  [default: none]",
 )
-@click.option(
-    "--vertex-colours",
-    is_flag=True,
-    help="Draw vertex colours on a board with a 25F, too. So far no placement of them was routed.",
-)
 @click.option("--record", type=OutputFile(), help="JSON file to which the figures of this run are added.")
 @click.option("--load", is_flag=True, help="Load the bitstream with openFPGALoader.")
 @options_of(OPTIONS)
@@ -93,7 +88,6 @@ def command(
     seeds,
     routed,
     loader,
-    vertex_colours,
     record,
     load,
     **_,
@@ -111,7 +105,7 @@ def command(
     With --from nothing is placed, and the command takes seconds. It refuses what would change more than the
     words of memories.
 
-    On an 85F vertex colours and textures are drawn if there is room for them. A warning says what is left
+    Vertex colours, and on an 85F textures, are drawn if there is room for them. A warning says what is left
     out, and why.
 
     The buttons of the board stop the motion, reverse it, and change the material and the light.
@@ -146,7 +140,7 @@ def command(
     from blysk.bench.tools.board_from import RoutedBitstream
 
     source = None if routed is None else RoutedBitstream.read(routed)
-    gpu, scenes, plan = work.planned(board, mesh, given, colours, clock, source, loader, None, vertex_colours)
+    gpu, scenes, plan = work.planned(board, mesh, given, colours, clock, source, loader)
     click.echo("\n".join(work.design_lines(board, mesh, gpu, plan)))
     if source is not None and not simulate:
         work.write_rewritten(work.rewritten_from(source, board, gpu, plan), output)

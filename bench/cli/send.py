@@ -39,7 +39,6 @@ __all__ = ["command"]
     show_default=True,
     help="As the bitstream was made.",
 )
-@click.option("--vertex-colours", is_flag=True, help="As the bitstream was made.")
 @click.option(
     "--clock",
     type=Number(1, 126, "MHz"),
@@ -48,7 +47,7 @@ __all__ = ["command"]
 )
 @options_of(OPTIONS)
 @click.pass_context
-def command(context, mesh, board_name, made_for, port, output, loader, colours, vertex_colours, clock, **_):
+def command(context, mesh, board_name, made_for, port, output, loader, colours, clock, **_):
     """Send MESH (a mesh file, a scene file, or teapot) to a board that runs.
 
     The bitstream on the board has a loader (blysk board --loader). Name the mesh for which it was made by
@@ -82,7 +81,7 @@ def command(context, mesh, board_name, made_for, port, output, loader, colours, 
         serial_library()
     else:
         check_outputs([], pictures=[], others=[output])
-    gpu, *_ = work.planned(board, mesh, given, colours, clock, None, loader, made_for, vertex_colours)
+    gpu, *_ = work.planned(board, mesh, given, colours, clock, None, loader, made_for)
     data = sent_by(gpu)
     words = ", ".join(f"{len(of.words):,} {of.name}" for of in gpu.drawing.memories)
     click.echo(f"{'words':<12}{words}")

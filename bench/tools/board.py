@@ -72,13 +72,12 @@ def planned(
     source: RoutedBitstream | None = None,
     loader: str | None = None,
     made_for: str | None = None,
-    vertex_colours: bool = False,
 ) -> tuple[Gpu, list[Scene], ClockPlan]:
     """The drawing of a mesh on a board, the scenes of its presets, and its clocks.
 
     Parameters
     ----------
-    board, mesh, given, colours, vertex_colours
+    board, mesh, given, colours
         As in `gpu_of`.
     clock : float, optional
         Rate of the drawing clock, MHz. By default that of the board.
@@ -100,9 +99,9 @@ def planned(
     if source is not None:
         lines = min(source.lines, board.lines)
     if made_for is not None:
-        first = gpu_of(board, made_for, given, colours, None, vertex_colours)[0]
+        first = gpu_of(board, made_for, given, colours)[0]
         lines = first.buffer.lines
-    gpu, scenes = gpu_of(board, mesh, given, colours, lines, vertex_colours)
+    gpu, scenes = gpu_of(board, mesh, given, colours, lines)
     try:
         plan = clock_plan(board.reference, gpu.buffer.mode.pixel_rate, 1e6 * clock)
     except NoClockPlan as error:

@@ -1,5 +1,6 @@
 """Design for a board: a scene, its presets for the buttons, and the top component with the board's pins."""
 
+import warnings
 from collections.abc import Mapping
 from dataclasses import replace
 from typing import Any
@@ -80,7 +81,6 @@ def gpu_of(
     given: Mapping[str, Any],
     colours: str = DEFAULT_COLOURS,
     lines: int | None = None,
-    vertex_colours: bool = False,
 ) -> tuple[Gpu, list[Scene]]:
     """The drawing of a mesh on a board, and the scenes of its presets.
 
@@ -88,9 +88,9 @@ def gpu_of(
     and the same material with four times the exponent. The lights are the given lights, or the given lights
     turned by a quarter around the up direction.
 
-    Vertex colours and textures are drawn if the board has room for them. A small device draws no textures,
-    and vertex colours only if they are wanted. If a mesh with colours does not fit it, its bands have half as
-    many lines. A larger image is halved until it fits. A warning names everything that is left out.
+    Vertex colours and textures are drawn if the board has room for them. A small device draws no textures. If
+    a mesh with colours does not fit it, its bands have half as many lines, and a warning says so. A larger
+    image is halved until it fits. A warning names everything that is left out.
 
     Parameters
     ----------
@@ -104,8 +104,6 @@ def gpu_of(
         A key of `COLOURS`.
     lines : int, optional
         Lines of a band. By default as many as fit.
-    vertex_colours : bool
-        Whether a small device draws vertex colours. So far no placement of them was routed there.
 
     Raises
     ------
@@ -117,14 +115,18 @@ def gpu_of(
         if settings["size"] != VGA.size:
             raise settings.refuse("size", "the display has 640x480 pixels", "leave it out", "")
         loaded = load(settings, lights=MAX_LIGHTS, local=False, cutoffs=False)
-        bits = COLOURS[colours]
+        bits, given_lines = COLOURS[colours], lines
         try:
-            scene, design, lines, less = _fitted(board, settings, loaded, bits, lines, vertex_colours)
+            scene, design, lines, less = _fitted(board, settings, loaded, bits, lines)
         except _NoRoom as error:
             loaded, lines, less = without_albedo(loaded, str(error)), lines or board.lines, ""
             (scene,) = scenes_of(loaded, settings)
             design = _design(settings, scene, board)
         warn_of_ignored(replace(loaded, ignored=(*loaded.ignored, *([less] if less else []))))
+        if given_lines is None and lines < board.lines:
+            text = f"{loaded.name} is drawn in bands of {lines} lines, because its colours take block RAMs"
+            remedy = "bands may be late at 60 Hz; count them with --simulate, or give --materials one"
+            warnings.warn(f"{text}; {remedy}", RuntimeWarning, stacklevel=2)
     scenes = _presets(scene, settings["up"])
     red, green, blue = background_code(scene, design.transfer).tolist()
     buffer = BandBuffer(VGA, lines, colour_bits=bits, background=(red, green, blue))
@@ -185,12 +187,10 @@ def _fitted(
     loaded: LoadedMesh,
     bits: tuple[int, int, int],
     lines: int | None,
-    vertex_colours: bool,
 ) -> tuple[Scene, ShadingPipeline, int, str]:
     """Scene, design and lines of a band for a mesh with its vertex colours and textures.
 
-    A text about smaller images comes last. If ``lines`` are given, a band has as many. ``vertex_colours`` are
-    those of a small device.
+    A text about smaller images comes last. If ``lines`` are given, a band has as many.
 
     Raises
     ------
@@ -203,8 +203,6 @@ def _fitted(
         return scene, design, lines or board.lines, ""
     if scene.textures and board.compact:
         raise _NoRoom(f"the {board.name} has too few multipliers for textures; use ulx3s-85f")
-    if board.compact and not vertex_colours:
-        raise _NoRoom(f"no placement of them was routed on the {board.name} so far; try --vertex-colours")
     # Bands of fewer lines take more cycles, because every band reads all triangles.
     least = board.lines // 2 if board.compact else board.lines
     choices = [lines] if lines else sorted({board.lines, least}, reverse=True)

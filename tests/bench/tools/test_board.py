@@ -158,36 +158,32 @@ def grid(side, colored=True, textured=False):
 
 @pytest.mark.parametrize("name", BOARDS)
 def test_colours_are_drawn_if_there_is_room(name, tmp_path):
-    """Boards with a 25F draw vertex colours if asked, of larger meshes with smaller bands.
+    """Boards with a 25F draw vertex colours, of larger meshes with smaller bands.
 
     They tell why they leave out textures, and colours of meshes that are too large.
     """
     colours, image = painted(tmp_path)
-    board, wanted = BOARDS[name], {"vertex_colours": True}
-    drawing = gpu_of(board, colours, {}, **wanted)[0].drawing
+    board = BOARDS[name]
+    drawing = gpu_of(board, colours, {})[0].drawing
     assert drawing.mesh.surface == drawing.renderer.geometry.surface == AttributeSpans()
     if not board.compact:
-        assert gpu_of(board, colours, {})[0].drawing.mesh.surface == AttributeSpans()
         return
-    told = (
-        rf"a is drawn without: vertex colours \(no placement of them was routed on the {name} so far; try --"
-    )
-    with pytest.warns(RuntimeWarning, match=told):
-        assert gpu_of(board, colours, {})[0].drawing.mesh.surface is None
     (tmp_path / "large.obj").write_text(grid(23))
-    large = gpu_of(board, str(tmp_path / "large.obj"), {}, **wanted)[0]
+    with pytest.warns(RuntimeWarning, match="large is drawn in bands of 4 lines, because its colours take b"):
+        large = gpu_of(board, str(tmp_path / "large.obj"), {})[0]
     assert large.drawing.mesh.surface == AttributeSpans()
     assert (drawing.lines, large.drawing.lines, large.buffer.lines) == (8, 4, 4)
     told = rf"large is drawn without: vertex colours \(with them the {name} has block RAMs for about 853 tri"
     less = replace(board, block_rams=46, lines=4)
     with pytest.warns(RuntimeWarning, match=told):
-        plain = gpu_of(less, str(tmp_path / "large.obj"), {}, **wanted)[0]
+        plain = gpu_of(less, str(tmp_path / "large.obj"), {})[0]
     assert plain.drawing.mesh.surface is None
     told = rf"b is drawn without: 1 texture \(the {name} has too few multipliers for textures; use ulx3s-85f"
     with pytest.warns(RuntimeWarning, match=told):
         gpu_of(board, image, {})
 
 
+@pytest.mark.filterwarnings("ignore:.*is drawn in bands of 4 lines:RuntimeWarning")
 def test_a_small_mesh_takes_the_bands_of_a_large_one(tmp_path):
     """A loader's bitstream for a large mesh with colours has bands of four lines."""
     small, large = (tmp_path / f"{name}.obj" for name in ("small", "large"))
@@ -195,9 +191,9 @@ def test_a_small_mesh_takes_the_bands_of_a_large_one(tmp_path):
     large.write_text(grid(23))
     board = BOARDS["ulx3s-25f"]
     for made_for, lines in ((None, 8), (str(large), 4)):
-        gpu, *_ = planned(board, str(small), {}, "rgb888", 52.5, None, "uart", made_for, True)
+        gpu, *_ = planned(board, str(small), {}, "rgb888", 52.5, None, "uart", made_for)
         assert (gpu.drawing.lines, gpu.buffer.lines) == (lines, lines)
-    first, *_ = planned(board, str(large), {}, "rgb888", 52.5, None, "uart", None, True)
+    first, *_ = planned(board, str(large), {}, "rgb888", 52.5, None, "uart")
     assert gpu.loader.decoder.start == first.loader.decoder.start
 
 
@@ -366,6 +362,7 @@ def memories_of(gpu, monkeypatch):
     return [(depth, width) for depth, width in found if depth >= 64]
 
 
+@pytest.mark.filterwarnings("ignore:.*is drawn in bands of 4 lines:RuntimeWarning")
 @pytest.mark.parametrize("side", [0, 22, 23])
 def test_drawings_of_a_small_board_have_their_block_rams(side, monkeypatch, tmp_path):
     """The memories of a whole drawing, each in the fewest block RAMs of one shape, are as many as counted.
@@ -376,7 +373,7 @@ def test_drawings_of_a_small_board_have_their_block_rams(side, monkeypatch, tmp_
     if colored:
         (tmp_path / "grid.obj").write_text(grid(side))
     mesh = str(tmp_path / "grid.obj") if colored else "teapot"
-    gpu = planned(board, mesh, {}, "rgb888", 52.5, vertex_colours=True)[0]
+    gpu = planned(board, mesh, {}, "rgb888", 52.5)[0]
     drawing, found = gpu.drawing, memories_of(gpu, monkeypatch)
     assert (drawing.mesh.surface is not None) == colored
     blocks = sum(block_rams(depth, width) for depth, width in found)
