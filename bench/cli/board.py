@@ -148,7 +148,7 @@ def command(
             work.load_bitstream(program, board, output)
         return
     if not simulate:
-        click.echo(f"{'bitstream':<12}known: {board.known}")
+        click.echo(f"{'bitstream':<12}of the default design: {board.known}")
     figures = recorded.setdefault(f"{board.name}, {mesh}, {gpu.drawing.mesh.triangles:,} triangles", {})
     if simulate:
         figures["simulated"] = work.simulated(board, gpu, scenes, plan, simulate, Path(output), source)

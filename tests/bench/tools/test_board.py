@@ -305,7 +305,7 @@ def test_what_is_known_is_printed_before_the_build(name, capsys, monkeypatch, tm
     monkeypatch.setattr("blysk.bench.tools.board.build", give_up)
     monkeypatch.setattr("blysk.bench.cli.board.packages_missing", lambda: None)
     assert main(["board", name, "--triangles", "100", "-o", str(tmp_path / "x.bit")]) == 1
-    assert f"bitstream   known: {BOARDS[name].known}\n" in told[0]
+    assert f"bitstream   of the default design: {BOARDS[name].known}\n" in told[0]
     assert re.search(r"commit [0-9a-f]{7}", BOARDS[name].known)
 
 
