@@ -39,7 +39,7 @@ class Formulas:
         if word.resource is None:
             self._put(self._of, word.name, formula)
             return
-        instance = f"{word.resource.name}_{graph.schedule.placements[word].instance}_"
+        instance = word.resource.prefix(graph.schedule.placements[word].instance)
         self._put(self._results, instance, formula or Formula(word.name))
         for k, operand in enumerate(word.given):
             for name in (str(k), "abcd"[k]):

@@ -15,6 +15,8 @@ from blysk.hdl.core.word import Word
 
 __all__ = ["Accumulator", "half"]
 
+_REGISTER = "sum"
+
 
 def half(fraction_bits: int) -> FixedValue:
     """Half a step of a number with these fraction bits. A sum that begins with it is rounded by a cut."""
@@ -38,6 +40,10 @@ class Accumulator:
         self._graph = graph
         self._words: list[Word] = []
         self._width = 0
+
+    def prefix(self, instance: int) -> str:
+        """Name of the register. There is one instance."""
+        return _REGISTER
 
     def sum(
         self,
@@ -104,7 +110,7 @@ class _Adder:
         if graph.multiplier.count != 1:
             raise ValueError(f"an accumulator takes products of one multiplier, not {graph.multiplier.count}")
         self._build, self._graph = build, graph
-        self.total = Signal(width, name="sum", reset_less=True)
+        self.total = Signal(width, name=_REGISTER, reset_less=True)
         self._products: list[tuple[Value, int]] = []
         self._others: list[tuple[Value, Value]] = []
         self._aligned: dict[int, tuple[FixedValue, Value]] = {}

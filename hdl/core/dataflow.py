@@ -67,6 +67,10 @@ class FunctionalUnit:
         """Number of instances."""
         return self.graph.schedule.counts.get(self, 0)
 
+    def prefix(self, instance: int) -> str:
+        """First characters of the names of an instance's registers."""
+        return f"{self.name}_{instance}_"
+
 
 class Dataflow:
     """Words of a `PipelinedUnit`, each a function of other words.
@@ -432,12 +436,12 @@ class _Build:
         key = functional_unit, instance
         if key not in self._instances:
             given = [
-                Signal(shape, name=f"{functional_unit.name}_{instance}_{k}", reset_less=True)
+                Signal(shape, name=f"{functional_unit.prefix(instance)}{k}", reset_less=True)
                 for k, shape in enumerate(functional_unit.shapes)
             ]
 
             def register(value, name):
-                return self.unit.register(self.m, value, f"{functional_unit.name}_{instance}_{name}")
+                return self.unit.register(self.m, value, f"{functional_unit.prefix(instance)}{name}")
 
             self._instances[key] = given, functional_unit.make(register, *given)
         self._issued.setdefault(key, []).append((when, operands))

@@ -207,6 +207,7 @@ def test_a_page_has_all_of_its_record_and_the_same_bytes_each_time(tmp_path):
     assert all(f"({unit}.md)" in index for unit in RECORDS)
 
 
+@pytest.mark.ci
 @pytest.mark.long
 @pytest.mark.parametrize("unit", RECORDS)
 def test_every_unit_has_a_page(unit, tmp_path, monkeypatch):

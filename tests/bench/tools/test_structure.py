@@ -27,6 +27,7 @@ from blysk.hdl.normals.difference_setup import DifferenceSetupUnit
 from blysk.hdl.normals.dot_product import DotProductUnit
 from blysk.hdl.normals.gpq import GPQUnit
 from blysk.hdl.normals.quadratic_evaluator import QuadraticEvaluatorUnit
+from blysk.hdl.video.vertex_unit import VertexUnit
 
 
 @cache
@@ -247,6 +248,13 @@ def test_boxes_have_formulas():
     assert [node.formulas for node in structure_of(DotProductUnit).nodes.values() if node.name == "sum"] == [
         ("a·b",)
     ]
+
+
+def test_an_accumulator_has_the_formulas_of_its_sums():
+    """One register has all sums of products of the vertex unit."""
+    (formulas,) = [n.formulas for n in structure_of(VertexUnit).nodes.values() if n.name == "sum"]
+    assert "w_offset + P_x·w_entry_0" in formulas
+    assert "y_sum_1 + P_z·y_entry_2" in formulas
 
 
 def test_loop_leads_back():
