@@ -22,6 +22,7 @@ from blysk.bench.tools.kept_builds import KeptBuild
 from blysk.bench.tools.memory_map import MemoryMap, ScenePatterns, blocks_of_netlist, carrying, memory_words
 from blysk.bench.tools.nextpnr import CROWDED, is_crowded, run_nextpnr
 from blysk.bench.tools.place_and_route import MAP_AFTER, MAP_BEFORE, YOSYS, versions_of
+from blysk.bench.tools.shared_addresses import share_addresses, text_of_addresses
 from blysk.bench.tools.tool_runner import MOUNT, GivenUp, TooLarge, ToolError, ToolRunner, Watch
 from blysk.hdl.core.scene_memory import contents_from
 
@@ -274,7 +275,7 @@ def build(
             (folder / file).write_bytes(text)
         script = _script(rates["sync"])
         options = repr((board.options, _LAYOUT, _SETTINGS, versions_of(ECP5)))
-        step = text_of_step() + text_of_carries()
+        step = text_of_step() + text_of_carries() + text_of_addresses()
         kept = KeptBuild((given.netlist, given.constraints, script, options, step))
         progress("mapping")
         if not kept.take(folder, "netlist.json"):
@@ -283,6 +284,7 @@ def build(
         mapped = json.loads((folder / "netlist.json").read_text(encoding="utf-8"))
         mapped, absorbed = absorb_registers(mapped)
         start_carries(mapped)
+        share_addresses(mapped)
         mapped["modules"]["top"]["settings"] = _SETTINGS
         (folder / "top.json").write_text(json.dumps(mapped), encoding="utf-8")
         refuse_too_large(board, mapped)
