@@ -22,7 +22,7 @@ PROJECT = Path(__file__).parents[3]
 APART = (
     *("dot_product", "difference_accumulator", "coarse_depth", "halfway_vector", "mirror_adapter"),
     *("span_halver", "vector_adapter", "light_adapter", "bisection_chain", "arccos", "chord", "half_chord"),
-    *("serial_vectors", "serial_vertex_sort"),
+    *("serial_vectors", "serial_vertex_sort", "depth_lanes"),
 )
 """Two small units, and parts with other structures than those of the cores."""
 
