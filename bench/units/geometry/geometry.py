@@ -138,6 +138,6 @@ RECORD = Record(
             "waiting_walks_level[3-6] waiting_attributes_level[5-6] "
             "waiting_walks_room[0] waiting_attributes_room[0]"
         ),
-        "a counter has room for more than a run has": "slivers[4-31] pieces_inside[5-9]",
+        "a counter has room for more than a run has": "slivers[4-31] emptys[9-31] pieces_inside[5-9]",
     },
 )
