@@ -6,6 +6,7 @@ import shutil
 import signal
 import subprocess
 import sys
+from contextlib import suppress
 from pathlib import Path
 from types import ModuleType
 
@@ -113,16 +114,22 @@ def test_verilog(capsys):
 def test_interrupt():
     """After Ctrl-C in a long run there is one line and status 130, and no file is left."""
     options = ["--engine", "pysim", "--vcd", "a.vcd", "--json", "a.json", "--compare", "a.png"]
-    process = subprocess.Popen(
+
+    def grows():
+        # A file that tries whether the folder can be written goes at once.
+        with suppress(FileNotFoundError):
+            return any(path.stat().st_size for path in Path().iterdir())
+
+    with subprocess.Popen(
         [*PROGRAM, "render", "teapot", *options], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
-    )
-    try:
-        # The simulation has begun when its waveforms grow.
-        wait(process, lambda: any(path.stat().st_size for path in Path().iterdir()), 60)
-        process.send_signal(signal.SIGINT)
-        output, errors = process.communicate(timeout=60)
-    finally:
-        process.kill()
+    ) as process:
+        try:
+            # The simulation has begun when its waveforms grow.
+            wait(process, grows, 60)
+            process.send_signal(signal.SIGINT)
+            output, errors = process.communicate(timeout=60)
+        finally:
+            process.kill()
     assert (process.returncode, output, errors) == (130, "", "blysk: interrupted\n")
     assert files() == {}
 
