@@ -16,13 +16,13 @@ from amaranth.hdl import Elaboratable
 
 from blysk.bench.tools.absorb_registers import absorb_registers, text_of_step
 from blysk.bench.tools.boards import Board, packages_missing
-from blysk.bench.tools.carry_starts import start_carries, text_of_carries
+from blysk.bench.tools.carry_starts import start_carries
 from blysk.bench.tools.families import ECP5, signal_name
-from blysk.bench.tools.kept_builds import KeptBuild
+from blysk.bench.tools.kept_builds import KeptBuild, text_of
 from blysk.bench.tools.memory_map import MemoryMap, ScenePatterns, blocks_of_netlist, carrying, memory_words
 from blysk.bench.tools.nextpnr import CROWDED, is_crowded, run_nextpnr
 from blysk.bench.tools.place_and_route import MAP_AFTER, MAP_BEFORE, YOSYS, versions_of
-from blysk.bench.tools.shared_addresses import share_addresses, text_of_addresses
+from blysk.bench.tools.shared_addresses import share_addresses
 from blysk.bench.tools.tool_runner import MOUNT, GivenUp, TooLarge, ToolError, ToolRunner, Watch
 from blysk.hdl.core.scene_memory import contents_from
 
@@ -275,7 +275,7 @@ def build(
             (folder / file).write_bytes(text)
         script = _script(rates["sync"])
         options = repr((board.options, _LAYOUT, _SETTINGS, versions_of(ECP5)))
-        step = text_of_step() + text_of_carries() + text_of_addresses()
+        step = text_of_step() + text_of(start_carries, share_addresses)
         kept = KeptBuild((given.netlist, given.constraints, script, options, step))
         progress("mapping")
         if not kept.take(folder, "netlist.json"):

@@ -6,10 +6,9 @@ carry of a chain from the operands alone, so that no constant is needed.
 """
 
 from collections.abc import Mapping
-from pathlib import Path
 from typing import Any
 
-__all__ = ["start_carries", "text_of_carries"]
+__all__ = ["start_carries"]
 
 _PINS = "ABCD"
 
@@ -57,11 +56,6 @@ def start_carries(netlist: Mapping[str, Any]) -> int:
         started += 1
     cells.update(sums)
     return started
-
-
-def text_of_carries() -> str:
-    """Text of this step, for the keys of kept results."""
-    return Path(__file__).read_text(encoding="utf-8")
 
 
 def _look_up_table(rows: list[int], inputs: dict[str, list[Any]], output: list[Any]) -> dict[str, Any]:

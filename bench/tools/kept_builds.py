@@ -2,14 +2,20 @@
 
 import contextlib
 import hashlib
+import inspect
 import os
 import shutil
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from pathlib import Path
 
 from blysk.sim.engines.cache import cache_folder
 
-__all__ = ["KeptBuild"]
+__all__ = ["KeptBuild", "text_of"]
+
+
+def text_of(*steps: Callable) -> str:
+    """Text of the files that define these functions, for the inputs of a `KeptBuild`."""
+    return "".join(Path(inspect.getfile(step)).read_text(encoding="utf-8") for step in steps)
 
 
 class KeptBuild:

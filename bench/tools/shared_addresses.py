@@ -6,10 +6,9 @@ the other bits a constant, and nextpnr leads this constant to all cells through 
 """
 
 from collections.abc import Mapping
-from pathlib import Path
 from typing import Any
 
-__all__ = ["share_addresses", "text_of_addresses"]
+__all__ = ["share_addresses"]
 
 
 def share_addresses(netlist: Mapping[str, Any]) -> int:
@@ -17,7 +16,7 @@ def share_addresses(netlist: Mapping[str, Any]) -> int:
 
     A bit is changed if it is the same constant for writing and for reading, and if both first bits are nets.
     Both addresses then change alike, and different addresses stay different. So each word that is read is the
-    word that was written. Cells whose words begin with a 1 stay unchanged.
+    word that was written. A cell with a 1 in its initial words stays unchanged.
 
     Parameters
     ----------
@@ -36,8 +35,3 @@ def share_addresses(netlist: Mapping[str, Any]) -> int:
                 written[bit], read[bit] = written[0], read[0]
                 shared += 1
     return shared
-
-
-def text_of_addresses() -> str:
-    """Text of this step, for the keys of kept results."""
-    return Path(__file__).read_text(encoding="utf-8")

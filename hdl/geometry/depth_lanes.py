@@ -137,7 +137,7 @@ class DepthLanesUnit(DepthTesterUnit):
         m.d.comb += copy_fields(shown, beats[last], "xy")
         for lane in range(self.lanes):
             number = (beats[last].x + lane)[: self._bits]
-            # A wire apart, because Verilator takes a word that reads its own bits for a loop.
+            # A separate wire: Verilator reports a loop if a word of the text reads its own bits.
             on = Signal(name=f"shows_{lane}")
             m.d.comb += on.eq(select([bank.last.on for bank in banks], number))
             depth = select([bank.last.depth for bank in banks], number)

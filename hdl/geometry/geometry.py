@@ -206,8 +206,7 @@ class GeometryUnit(wiring.Component):
       these bits. At the same time the normals take three cycles each. With ``vectors`` a span takes three
       more cycles for each piece behind the first, and each time that a piece does not fit (`SpanHalverUnit`).
       In the compact style a piece takes 13 cycles or more at the same time, and with a surface 3 more for
-      each of its attributes
-      (`SerialVectorsUnit`).
+      each of its attributes (`SerialVectorsUnit`).
 
     The number of multipliers is `multipliers`: 16, or 5 in the compact style. With ``lines`` or ``vectors``
     it is 10, or 2 in the compact style. Each further lane adds 4, or 2 in the compact style.

@@ -52,7 +52,7 @@ def test_words_are_found_again(constants, last):
     ],
 )
 def test_others_stay(written, read, words):
-    """Bits that differ, a constant first bit, and words that begin with a 1."""
+    """Bits that differ, a constant first bit, and a 1 in the initial words."""
     old = netlist(written, read, words)
     new = copy.deepcopy(old)
     assert share_addresses(new) == 0
